@@ -1,0 +1,1 @@
+"""Flight logs by the thousand through today's code."""

@@ -1,0 +1,60 @@
+"""A simulated flight as its files have it, for a judge who was not there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from flightd.app.recording import SETTING_TOPICS, recorded_setting
+from flightd.app.simulation.simulation import Simulation
+from flightd.core.errors import InputError
+from flightd.core.topics import Document, Topic
+from flightd.replay.log import FlightLog, read_log
+from flightd.sim.scenario.scenario import Scenario
+
+
+def recorded_simulation(log: Path) -> tuple[Simulation, dict[str, Any]] | None:
+    """The simulation that wrote `log`, and the summary that it left; None where no `truth.mcap` and
+    `summary.json` lie beside it.  InputError for files that do not hold what they should."""
+    truth, summary = log.with_name("truth.mcap"), log.with_name("summary.json")
+    if not truth.exists() or not summary.exists():
+        return None
+    told = _summary(summary)
+    recorded = read_log(log, {Topic.SCENARIO, *SETTING_TOPICS})
+    flown = recorded_setting(recorded)
+    simulation = Simulation(
+        config=flown.config,
+        site=flown.site,
+        scenario=_scenario(recorded),
+        seed=told["seed"],
+        speed=None,
+        folder=log.parent,
+        order=flown.order,
+    )
+    return simulation, told
+
+
+def _summary(path: Path) -> dict[str, Any]:
+    try:
+        told = json.loads(path.read_bytes())
+    except (OSError, ValueError) as err:
+        raise InputError(f"cannot be read: {err}", file=path) from None
+    if not isinstance(told, dict) or not isinstance(told.get("seed"), int):
+        raise InputError("is no summary of a simulated flight: no seed", file=path)
+    return told
+
+
+def _scenario(log: FlightLog) -> Scenario:
+    documents = log.messages(Document, Topic.SCENARIO)
+    if not documents:
+        raise InputError("holds no scenario: an older version recorded it", file=log.path)
+    try:
+        return Scenario.model_validate_json(documents[-1].text)
+    except ValidationError as err:
+        first = err.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        what = f"its scenario is of another version: {where}: {first['msg']}"
+        raise InputError(what, file=log.path) from None

@@ -1,0 +1,94 @@
+"""Where logs lie: files, folders with all that is below them, and whatever fsspec opens by a URL."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+from flightd.core.errors import InputError, UnavailableError
+
+_ENDING: Final = ".mcap"
+_TRUTH: Final = "truth"
+"""The simulator's own log beside that of a flight is not one."""
+
+
+@dataclass(frozen=True, slots=True)
+class LogSource:
+    """One log: what it is called in the results, and where it is (a path, or a URL)."""
+
+    name: str
+    place: str
+
+    @contextlib.contextmanager
+    def fetched(self) -> Iterator[Path]:
+        """The log as a file with all that lies beside it; gone afterwards if it had to be fetched."""
+        if "://" not in self.place:
+            yield Path(self.place)
+            return
+        files, path = _file_system(self.place)
+        with TemporaryDirectory(prefix="flightd-study-") as made:
+            try:
+                files.get(str(PurePosixPath(path).parent) + "/", made + "/", recursive=True)
+            except OSError as err:
+                raise UnavailableError(f"cannot be fetched: {err}", file=self.place) from None
+            yield Path(made) / PurePosixPath(path).name
+
+
+def log_sources(places: Sequence[str]) -> list[LogSource]:
+    """All logs that `places` mean, by name; each once.  InputError where one has none."""
+    found: dict[str, LogSource] = {}
+    for place in places:
+        here = list(_remote(place) if "://" in place else _local(Path(place)))
+        if not here:
+            raise InputError(
+                "holds no flight log", file=place, remedy=f"give *{_ENDING} files, or folders of them"
+            )
+        found |= {source.place: source for source in here}
+    return sorted(found.values(), key=lambda source: source.name)
+
+
+def _local(path: Path) -> Iterator[LogSource]:
+    if path.is_file():
+        yield LogSource(str(path), str(path.resolve()))
+        return
+    if not path.is_dir():
+        raise InputError("is neither a log nor a folder", file=path)
+    for log in sorted(path.rglob(f"*{_ENDING}")):
+        if _is_flight(log.name) and log.is_file():
+            yield LogSource(str(log), str(log.resolve()))
+
+
+def _remote(url: str) -> Iterator[LogSource]:
+    files, path = _file_system(url)
+    scheme = url.partition("://")[0]
+    try:
+        names = [path] if path.endswith(_ENDING) else sorted(files.find(path))
+    except OSError as err:
+        raise UnavailableError(f"cannot be listed: {err}", file=url) from None
+    for name in names:
+        if _is_flight(PurePosixPath(name).name):
+            place = f"{scheme}://{name.removeprefix(f'{scheme}://')}"
+            yield LogSource(place, place)
+
+
+def _is_flight(name: str) -> bool:
+    return name.endswith(_ENDING) and not name.startswith(_TRUTH)
+
+
+def _file_system(url: str) -> tuple[Any, str]:
+    """The file system of a URL, and the path on it."""
+    try:
+        import fsspec
+    except ImportError:
+        raise UnavailableError(
+            "needs fsspec", file=url, remedy="pip install 'flightd[study]', for S3 s3fs beside it"
+        ) from None
+    try:
+        files, path = fsspec.core.url_to_fs(url)
+    except (ImportError, ValueError, OSError) as err:
+        raise UnavailableError(f"cannot be opened: {err}", file=url) from None
+    return files, str(path)

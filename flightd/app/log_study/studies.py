@@ -1,0 +1,194 @@
+"""The studies: one log through today's code, and what differs from what was recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import cv2
+import numpy as np
+
+from flightd.adapters.store.for_reading import opened_for_reading
+from flightd.app.build import detector_of, pilot_of
+from flightd.app.log_study.finding import Finding, LogFindings, Outcome, Study, same_or
+from flightd.app.log_study.recorded_simulation import recorded_simulation
+from flightd.app.recording import SETTING_TOPICS, recorded_setting
+from flightd.app.simulation.judgement import judge_flight
+from flightd.core.errors import FlightdError, InputError
+from flightd.core.inventory import LocationRecord
+from flightd.core.topics import Topic
+from flightd.replay.decision_compare import comparison_document, replay_decisions
+from flightd.replay.log import read_log
+from flightd.replay.perception_compare import replay_pictures
+from flightd.studies.flight_calibration import calibrate_by_flight
+from flightd.vision.shelf.code_reader import read_codes
+
+_LAST_DIGITS: Final = 1e-9
+_PIXELS: Final = 0.5
+"""What `flightd replay` allows by itself."""
+_LOST_SHARE: Final = 0.02
+"""Labels that the compression of the kept picture may cost."""
+_JUDGED_WITHIN: Final = 1e-6
+
+
+def study_log(path: Path, name: str, studies: Sequence[Study]) -> LogFindings:
+    """Do each study with one log; what goes wrong with one is its finding, and costs the others nothing."""
+    cv2.setNumThreads(1)  # the cores are shared out among the logs
+    findings: dict[Study, Finding] = {}
+    for study in studies:
+        try:
+            findings[study] = _STUDIES[study](path)
+        except FlightdError as err:
+            findings[study] = Finding(Outcome.FAILED, str(err).replace(f"{path.parent}/", ""))
+    return LogFindings(name, findings)
+
+
+def _detect(path: Path) -> Finding:
+    flown = recorded_setting(read_log(path, SETTING_TOPICS))
+    seen = replay_pictures(path, detector_of(flown.config, flown.site)().detect)
+    if not seen.pictures:
+        return Finding(Outcome.NOTHING, "no recorded picture to see again")
+    return same_or(seen.complaint(_PIXELS), asdict(seen) | {"may_tip": seen.may_tip})
+
+
+def _replay(path: Path) -> Finding:
+    recorded = read_log(path, {Topic.TICK, Topic.DECISION, *SETTING_TOPICS})
+    if not any(entry.topic == Topic.TICK for entry in recorded.entries):
+        return Finding(Outcome.NOTHING, "holds no ticks to replay")
+    flown = recorded_setting(recorded)
+    step = pilot_of(flown.config, flown.site, flown.order, flown.learnt).step
+    decisions = replay_decisions(recorded, step)
+    complaint = ""
+    if decisions.missing:
+        complaint = f"{decisions.missing} ticks or decisions are missing in the log"
+    elif not decisions.within(_LAST_DIGITS):
+        first = min(decisions.drifts, key=lambda drift: (drift.first_s, drift.field))
+        complaint = (
+            f"{decisions.differing} of {decisions.ticks} decisions drift, "
+            f"first {first.field} at {first.first_s:.2f} s"
+        )
+    return same_or(complaint, comparison_document(decisions))
+
+
+def _codes(path: Path) -> Finding:
+    if not (path.parent / "inventory.db").exists():
+        return Finding(Outcome.NOTHING, "no inventory beside it")
+    with opened_for_reading(path.parent) as store:
+        kept = [(record, _kept(store.evidence.path, record)) for record in store.locations()]
+    pictures = gone = same = more = 0
+    lost: list[str] = []
+    other: list[str] = []
+    for record, picture in kept:
+        before = _texts(record)
+        if picture is None:
+            gone += bool(before)
+            continue
+        pictures += 1
+        now = {read.text for read in read_codes(picture) if read.believed}
+        if not before:
+            more += bool(now)
+        elif now == before:
+            same += 1
+        else:
+            (lost if now <= before else other).append(record.code)
+    if not pictures:
+        return Finding(Outcome.NOTHING, "no label's picture is kept beside it")
+    allowed = math.ceil(_LOST_SHARE * (same + len(lost)))
+    told = []
+    if other:
+        told.append(f"{len(other)} places read otherwise, first {other[0]}")
+    if len(lost) > allowed:
+        told.append(f"{len(lost)} places not read again, {allowed} allowed, first {lost[0]}")
+    figures = {
+        "pictures": pictures, "without_picture": gone, "same": same, "newly_read": more,
+        "lost": sorted(lost), "otherwise": sorted(other),
+    }  # fmt: skip
+    return same_or("; ".join(told), figures)
+
+
+def _texts(record: LocationRecord) -> set[str]:
+    return {read.text for read in record.observation.reads} if record.observation else set()
+
+
+def _kept(
+    path_of: Callable[[str], Path], record: LocationRecord
+) -> np.ndarray[Any, np.dtype[np.uint8]] | None:
+    """The picture that vouches for a place, None where none is kept or it cannot be read."""
+    if record.observation is None or not record.observation.evidence:
+        return None
+    try:
+        data = path_of(record.observation.evidence).read_bytes()
+    except (OSError, ValueError):
+        return None
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
+    return None if picture is None else np.asarray(picture, np.uint8)
+
+
+def _judge(path: Path) -> Finding:
+    recorded = recorded_simulation(path)
+    if recorded is None:
+        return Finding(Outcome.NOTHING, "no truth of a simulator beside it")
+    simulation, summary = recorded
+    judged = judge_flight(simulation)
+    today = asdict(judged.score) | {
+        "verdict": judged.verdict,
+        "faults": [asdict(fault) for fault in judged.faults],
+    }
+    differing = {
+        name: {"recorded": summary[name], "today": value}
+        for name, value in today.items()
+        if name in summary and not _alike(summary[name], value)
+    }
+    return same_or(_named(differing), {"today": today, "differing": differing})
+
+
+def _named(differing: Mapping[str, Mapping[str, Any]]) -> str:
+    if not differing:
+        return ""
+    name, values = next(iter(differing.items()))
+    more = f" and {len(differing) - 1} more" if len(differing) > 1 else ""
+    return f"{name} {values['recorded']} is {values['today']} today{more}"
+
+
+def _alike(recorded: Any, today: Any) -> bool:
+    if isinstance(recorded, int | float) and isinstance(today, int | float):
+        return math.isclose(recorded, today, rel_tol=_JUDGED_WITHIN, abs_tol=_JUDGED_WITHIN)
+    if isinstance(recorded, list) and isinstance(today, list | tuple):
+        return len(recorded) == len(today) and all(map(_alike, recorded, today))
+    if isinstance(recorded, dict) and isinstance(today, dict):
+        return recorded.keys() == today.keys() and all(_alike(recorded[k], today[k]) for k in recorded)
+    return bool(recorded == today)
+
+
+def _calibrate(path: Path) -> Finding:
+    """What differs surely from what is configured is told; no log is worse for that."""
+    fitted = calibrate_by_flight(path)
+    text = ", ".join(f"{key} = {value}" for key, value in fitted.keys.items())
+    return Finding(Outcome.SAME, f"configure {text}" if text else "", fitted.document())
+
+
+_STUDIES: Mapping[Study, Callable[[Path], Finding]] = MappingProxyType(
+    {
+        Study.DETECT: _detect,
+        Study.REPLAY: _replay,
+        Study.CODES: _codes,
+        Study.JUDGE: _judge,
+        Study.CALIBRATE: _calibrate,
+    }
+)
+
+
+def chosen_studies(text: str) -> tuple[Study, ...]:
+    """Those named in a list with commas, each once.  InputError for one that there is not, or none."""
+    names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    known = ", ".join(Study)
+    for name in names:
+        if name not in set(Study):
+            raise InputError("no such study", key=f"--with {name}", remedy=f"choose of {known}")
+    if not names:
+        raise InputError("names no study", key="--with", remedy=f"choose of {known}")
+    return tuple(Study(name) for name in names)

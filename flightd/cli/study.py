@@ -1,0 +1,130 @@
+"""`flightd study`: many flight logs through today's code.  What it does is imported when it runs."""
+
+from __future__ import annotations
+
+import enum
+import json
+import os
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flightd.cli.options import AsJson
+from flightd.core.errors import InputError, RunError, cannot_write
+
+if TYPE_CHECKING:
+    from flightd.app.log_study.finding import LogFindings, Study
+
+EXAMPLES = """Examples:
+  flightd study flights/ --with replay              would today's code decide the same?
+  flightd study flights/ --with detect,codes,judge --json
+  flightd study s3://hall-3/2026/ --with detect --engine ray --address ray://head:10001
+"""
+
+
+class Engine(enum.StrEnum):
+    """Who does the work."""
+
+    LOCAL = "local"
+    RAY = "ray"
+
+
+def register(app: typer.Typer) -> None:
+    """Hang `study` on `app`."""
+    app.command("study", epilog=EXAMPLES)(study)
+
+
+def study(
+    paths: Annotated[
+        list[str], typer.Argument(metavar="PATH…", help="Flight logs, folders of them, and URLs of either.")
+    ],
+    studies: Annotated[
+        str, typer.Option("--with", metavar="NAME,…", help="detect, replay, codes, judge, calibrate.")
+    ] = "replay,detect",
+    engine: Annotated[Engine, typer.Option(help="All cores of this computer, or Ray.")] = Engine.LOCAL,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Logs at a time; as many as there are cores.")
+    ] = None,
+    address: Annotated[
+        str, typer.Option(metavar="URL", help="The Ray cluster; RAY_ADDRESS, or one started for this.")
+    ] = "",
+    out: Annotated[
+        Path | None, typer.Option(metavar="F", help="Write the findings there, a line of JSON for each log.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Take flight logs, thousands if need be, through today's code: what would be seen, decided, read and
+    judged now, and what differs from what was recorded.
+
+    \b
+    detect      the recorded pictures seen again, as `flightd replay` compares them
+    replay      every decision made again
+    codes       the labels' pictures that the inventory beside the log keeps, read again
+    judge       a simulated flight judged again by the truth beside it
+    calibrate   the sensors fitted by the flight; what differs is told and no failure
+
+    Exit 0 if nothing differs, else 1.  A log that cannot be studied is told, and costs the others nothing.
+    """
+    from flightd.app.log_study.engines import run_local, run_ray
+    from flightd.app.log_study.sources import log_sources
+    from flightd.app.log_study.studies import chosen_studies
+    from flightd.studies.progress_bar import track
+
+    if address and engine is Engine.LOCAL:
+        raise InputError("is for --engine ray alone", key="--address")
+    chosen, sources = chosen_studies(studies), log_sources(paths)
+    width = min(workers or os.cpu_count() or 1, len(sources))
+    running = (
+        run_local(sources, chosen, width)
+        if engine is Engine.LOCAL
+        else run_ray(sources, chosen, width, address=address)
+    )
+    found: dict[int, LogFindings] = dict(track(running, "studying", len(sources)))
+    ordered = [found[number] for number in range(len(sources))]
+    if out is not None:
+        _write(out, ordered)
+    failed = sum(not log.passed for log in ordered)
+    if as_json:
+        print(json.dumps(_document(ordered, chosen), ensure_ascii=False))
+    else:
+        _print(ordered, chosen)
+    if failed:
+        raise RunError(f"{failed} of {len(ordered)} logs differ or could not be studied")
+
+
+def _document(found: list[LogFindings], studies: tuple[Study, ...]) -> dict[str, Any]:
+    outcomes = {
+        study.value: dict(sorted(Counter(log.findings[study].outcome.value for log in found).items()))
+        for study in studies
+    }
+    return {
+        "passed": all(log.passed for log in found),
+        "outcomes": outcomes,
+        "logs": [log.document() for log in found],
+    }
+
+
+def _write(path: Path, found: list[LogFindings]) -> None:
+    lines = [json.dumps(log.document(), ensure_ascii=False) + "\n" for log in found]
+    try:
+        path.write_text("".join(lines), encoding="utf-8")
+    except OSError as err:
+        raise cannot_write(path, err) from None
+
+
+def _print(found: list[LogFindings], studies: tuple[Study, ...]) -> None:
+    from rich.table import Table
+
+    from flightd.cli.tables import stdout
+    from flightd.core.terminal_text import visible
+
+    table = Table()
+    table.add_column("log", overflow="fold")
+    for study in studies:
+        table.add_column(study.value, overflow="fold")
+    for log in found:
+        cells = (log.findings[study] for study in studies)
+        table.add_row(visible(log.log), *(visible(cell.text or cell.outcome.value) for cell in cells))
+    stdout().print(table)

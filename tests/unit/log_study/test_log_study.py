@@ -1,0 +1,157 @@
+"""Many logs through today's code: each by itself, on whatever engine; no worker's death changes a word."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
+from flightd.app.log_study.engines import Work, run_local, run_ray, study_source
+from flightd.app.log_study.finding import LogFindings, Outcome, Study
+from flightd.app.log_study.sources import LogSource, log_sources
+from flightd.config.schema import load_config
+from flightd.core.topics import Document, RecordedFrame, Topic
+from flightd.replay.log import read_log
+from tests.command import Command
+from tests.replay.synthetic_flight import write_flight
+from tests.unit.log_study.dying_work import always_dies, dies_once
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+STUDIES = (Study.DETECT, Study.JUDGE)
+
+
+@pytest.fixture(scope="module")
+def flights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four flights, one of them cut to nothing."""
+    folder = tmp_path_factory.mktemp("flights")
+    (folder / "a").mkdir()
+    (folder / "raw").mkdir()
+    raw = write_flight(folder / "raw", seed=3)
+    with McapRecorder(folder / "a" / "flight.mcap", when_full=wait_for_disk) as recorder:
+        recorder.record(Topic.CONFIG, 0, Document(load_config(CONFIGS / "sim.toml").model_dump_json()))
+        for entry in read_log(raw).entries:
+            if entry.topic == Topic.FRAME and isinstance(entry.message, RecordedFrame):
+                recorder.image(Topic.FRAME, entry.stamp_ns, entry.message.seq, entry.message.jpeg)
+            elif entry.topic != Topic.CONFIG:
+                recorder.record(entry.topic, entry.stamp_ns, entry.message)
+    for name in ("truth.mcap", "summary.json"):
+        shutil.move(folder / "raw" / name, folder / "a")
+    shutil.rmtree(folder / "raw")
+    for name in "bc":
+        shutil.copytree(folder / "a", folder / name)
+    (folder / "c" / "summary.json").unlink()
+    (folder / "d").mkdir()
+    (folder / "d" / "flight.mcap").write_bytes(b"no log at all")
+    return folder
+
+
+def told(sources: list[LogSource], found: Iterator[tuple[int, LogFindings]]) -> str:
+    by_number = dict(found)
+    assert by_number.keys() == set(range(len(sources)))
+    return "\n".join(json.dumps(by_number[number].document()) for number in range(len(sources)))
+
+
+def serial(sources: list[LogSource]) -> str:
+    return told(sources, ((number, study_source(one, STUDIES)) for number, one in enumerate(sources)))
+
+
+def test_each_log_is_studied_and_a_bad_one_costs_the_others_nothing(
+    flightd: Command, flights: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "found.jsonl"
+    ended = flightd(
+        "study", flights, "--with", "detect,replay,judge,codes", "--out", out, "--json", "--workers", 2
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines() == ["flightd: 4 of 4 logs differ or could not be studied"]
+    document: dict[str, Any] = json.loads(ended.stdout)
+    assert [json.loads(line) for line in out.read_text().splitlines()] == document["logs"]
+    a, b, c, d = (log["studies"] for log in document["logs"])
+    assert a == b
+    assert a["replay"] == {"outcome": "nothing", "text": "holds no ticks to replay", "figures": {}}
+    assert a["codes"]["outcome"] == "nothing"
+    assert a["judge"]["outcome"] == "failed"
+    assert "holds no scenario" in a["judge"]["text"]
+    assert c["judge"] == {"outcome": "nothing", "text": "no truth of a simulator beside it", "figures": {}}
+    assert c["detect"]["outcome"] in {"same", "different"}
+    assert {finding["outcome"] for finding in d.values()} == {"failed", "nothing"}
+    assert document["outcomes"]["codes"] == {"nothing": 4}
+
+
+def test_a_flight_of_today_is_seen_decided_and_judged_as_it_was(
+    flightd: Command, recorded_flight: Path, tmp_path: Path
+) -> None:
+    ended = flightd("study", recorded_flight, "--with", "replay,judge,calibrate", "--json", "--workers", 1)
+    (log,) = json.loads(ended.stdout)["logs"]
+    assert (log["studies"]["replay"]["outcome"], log["studies"]["judge"]["outcome"]) == ("same", "same")
+    assert log["studies"]["judge"]["figures"]["differing"] == {}
+    other = tmp_path / "flight"
+    shutil.copytree(recorded_flight, other)
+    summary = json.loads((other / "summary.json").read_text())
+    summary["cross_track_rms_m"] += 0.01
+    (other / "summary.json").write_text(json.dumps(summary))
+    ended = flightd("study", other / "flight.mcap", "--with", "judge")
+    assert ended.returncode == 1
+    assert "cross_track_rms_m" in ended.stdout
+
+
+@pytest.mark.parametrize("work", [dies_once, always_dies])
+def test_a_worker_that_dies_costs_time_alone(flights: Path, tmp_path: Path, work: Work) -> None:
+    shutil.copytree(flights, tmp_path / "flights")
+    sources = log_sources([str(tmp_path / "flights")])
+    right = serial(sources)
+    (tmp_path / "flights" / "b" / work.__name__.replace("_", " ")).touch()
+    found = dict(run_local(sources, STUDIES, 2, work))
+    if work is dies_once:
+        assert told(sources, iter(found.items())) == right
+        return
+    assert {finding.text for finding in found.pop(1).findings.values()} == {"its worker died 3 times"}
+    rest = [json.dumps(found[number].document()) for number in sorted(found)]
+    assert rest == [line for number, line in enumerate(right.splitlines()) if number != 1]
+
+
+def test_ray_finds_the_same_byte_for_byte_though_a_worker_is_killed(flights: Path, tmp_path: Path) -> None:
+    pytest.importorskip("ray", reason="the tests of --engine ray need it: pip install -e '.[ray]'")
+    for number in range(2):
+        shutil.copytree(flights, tmp_path / "flights" / str(number))
+    sources = log_sources([str(tmp_path / "flights")])
+    right = serial(sources)
+    (tmp_path / "flights" / "1" / "b" / "dies once").touch()
+    assert told(sources, run_ray(sources, STUDIES, 2, dies_once)) == right
+
+
+def test_logs_are_fetched_from_wherever_fsspec_finds_them(flights: Path) -> None:
+    here = log_sources([str(flights)])
+    there = log_sources([f"file://{flights}"])
+    assert [source.name for source in there] == [f"file://{source.place}" for source in here]
+    near, far = study_source(here[0], STUDIES), study_source(there[0], STUDIES)
+    assert near.findings == far.findings
+    assert near.findings[Study.DETECT].outcome is not Outcome.FAILED
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--with", "replay,guess"), "--with guess: no such study; choose of detect, replay, codes"),
+        (("--with", ","), "--with: names no study"),
+        (("--address", "ray://x:1"), "--address: is for --engine ray alone"),
+    ],
+)
+def test_what_is_not_there_is_one_line(
+    flightd: Command, flights: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    ended = flightd("study", flights, *arguments)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert said in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+
+
+def test_a_place_without_a_log_is_named(flightd: Command, tmp_path: Path) -> None:
+    assert "holds no flight log" in flightd("study", tmp_path).stderr
+    assert "is neither a log nor a folder" in flightd("study", tmp_path / "nowhere").stderr
+    assert "cannot be opened" in flightd("study", "nonsense://x/y").stderr
