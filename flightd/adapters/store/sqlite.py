@@ -30,10 +30,14 @@ from flightd.core.inventory import (
 )
 from flightd.core.types import CodeRead
 
-_VERSION = 2
+_VERSION = 3
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
-_FROM_1 = "ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1"
+_TAKEN_OVER = {
+    1: ("ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1",),
+    2: ("ALTER TABLE code_read ADD COLUMN module_px REAL",),
+}
+"""What makes a file of each earlier format one of the next."""
 _SCHEMA = """
 CREATE TABLE location (
     code TEXT PRIMARY KEY,
@@ -60,6 +64,7 @@ CREATE TABLE code_read (
     agreeing INTEGER NOT NULL,
     quality REAL NOT NULL,
     gs1 TEXT NOT NULL,
+    module_px REAL,
     PRIMARY KEY (observation, number)
 ) STRICT, WITHOUT ROWID;
 """
@@ -108,9 +113,8 @@ class SqliteStore:
             if application != _APPLICATION:
                 raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
             if version != _VERSION:
-                remedy = (
-                    f"flightd inventory show {self.folder}" if version == 1 else "the flightd that wrote it"
-                )
+                older = version in _TAKEN_OVER
+                remedy = f"flightd inventory show {self.folder}" if older else "the flightd that wrote it"
                 problem = f"format {version}, known here is {_VERSION}"
                 raise InputError(f"{self._file}: {problem}", remedy=f"open it once with {remedy}")
 
@@ -147,8 +151,9 @@ class SqliteStore:
                     self._db.execute(f"PRAGMA application_id = {_APPLICATION}")
                 elif application != _APPLICATION:
                     raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
-                elif version == 1:
-                    self._db.execute(_FROM_1)
+                elif version in _TAKEN_OVER:
+                    for statement in (s for v in range(version, _VERSION) for s in _TAKEN_OVER[v]):
+                        self._db.execute(statement)
                     self._db.execute(f"PRAGMA user_version = {_VERSION}")
                 elif version != _VERSION:
                     problem = f"format {version}, known here is {_VERSION}"
@@ -252,9 +257,19 @@ class SqliteStore:
             )
             return
         self._db.executemany(
-            "INSERT INTO code_read VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO code_read VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
             [
-                (seen.id, i, r.symbology, r.text, r.sure, r.agreeing, r.quality, json.dumps(r.gs1))
+                (
+                    seen.id,
+                    i,
+                    r.symbology,
+                    r.text,
+                    r.sure,
+                    r.agreeing,
+                    r.quality,
+                    json.dumps(r.gs1),
+                    r.module_px,
+                )
                 for i, r in enumerate(seen.reads)
             ],
         )
@@ -281,11 +296,13 @@ class SqliteStore:
     def _observations(self, location: str | None = None) -> list[tuple[Observation, int]]:
         """All looks, or those at one location, with their standing, oldest first."""
         reads: dict[str, list[CodeRead]] = {}
-        for seen, symbology, text, sure, agreeing, quality, gs1 in self._db.execute(
-            "SELECT observation, symbology, text, sure, agreeing, quality, gs1 FROM code_read "
+        for seen, symbology, text, sure, agreeing, quality, gs1, module_px in self._db.execute(
+            "SELECT observation, symbology, text, sure, agreeing, quality, gs1, module_px FROM code_read "
             "ORDER BY observation, number"
         ):
-            read = CodeRead(symbology, text, (), bool(sure), agreeing, quality, _elements(gs1))
+            read = CodeRead(
+                symbology, text, (), bool(sure), agreeing, quality, _elements(gs1), module_px=module_px
+            )
             reads.setdefault(seen, []).append(read)
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
