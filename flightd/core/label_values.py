@@ -13,6 +13,8 @@ Told: TypeAlias = str | date | Decimal
 
 LEAST_CONFIDENCE: Final = 0.7
 """A value is known from this confidence on, unless another one is demanded."""
+LEAST_TEXT_CONFIDENCE: Final = 0.9
+"""And one of printed text from this on, whatever else is demanded: nothing vouches for it."""
 
 
 class ValueKind(enum.StrEnum):

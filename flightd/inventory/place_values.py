@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from flightd.core.inventory import LocationState, Observation
 from flightd.core.label_values import (
     LEAST_CONFIDENCE,
+    LEAST_TEXT_CONFIDENCE,
     LabelValue,
     PlaceValue,
     UnknownReason,
@@ -31,6 +32,7 @@ def place_values(
     if seen is None:
         return ()
     told = [value for read in seen.reads for value in _told(read, seen)]
+    told += [value for value in seen.texts if value.source is ValueSource.TEXT]
     several = UnknownReason.SEVERAL if seen.state is LocationState.SEVERAL else UnknownReason.CONTRADICTING
     return _settled(told, least_confidence, several)
 
@@ -57,10 +59,18 @@ def _settled(
     )
 
 
+def _is_sure(value: LabelValue, least_confidence: float) -> bool:
+    """Nothing vouches for printed text, so more is demanded of it."""
+    text = value.source is ValueSource.TEXT
+    return value.confidence > 0.0 and value.confidence >= max(
+        least_confidence, LEAST_TEXT_CONFIDENCE if text else 0.0
+    )
+
+
 def _of_kind(
     kind: ValueKind, told: list[LabelValue], least_confidence: float, differing: UnknownReason
 ) -> PlaceValue:
-    sure = [value for value in told if value.confidence >= least_confidence and value.confidence]
+    sure = [value for value in told if _is_sure(value, least_confidence)]
     if not sure:
         return PlaceValue(kind, None, UnknownReason.UNSURE)
     if len({(value.value, value.unit) for value in sure}) > 1:

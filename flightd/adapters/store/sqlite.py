@@ -18,6 +18,14 @@ from pathlib import Path
 from typing import Any, Self
 
 from flightd.adapters.store.evidence_pictures import EvidenceFolder
+from flightd.adapters.store.label_texts import (
+    TEXT_TABLES,
+    all_searches,
+    keep_texts,
+    kept_texts,
+    merge_texts,
+    was_searched,
+)
 from flightd.adapters.store.read_only import connect_read_only
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
@@ -28,6 +36,7 @@ from flightd.core.inventory import (
     PlannedLocation,
     Standing,
 )
+from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
 _VERSION = 3
@@ -35,7 +44,7 @@ _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
 _TAKEN_OVER = {
     1: ("ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1",),
-    2: ("ALTER TABLE code_read ADD COLUMN module_px REAL",),
+    2: ("ALTER TABLE code_read ADD COLUMN module_px REAL", *TEXT_TABLES),
 }
 """What makes a file of each earlier format one of the next."""
 _SCHEMA = """
@@ -67,7 +76,7 @@ CREATE TABLE code_read (
     module_px REAL,
     PRIMARY KEY (observation, number)
 ) STRICT, WITHOUT ROWID;
-"""
+""" + "".join(f"{table};\n" for table in TEXT_TABLES)
 
 
 class SqliteStore:
@@ -239,6 +248,17 @@ class SqliteStore:
             ).fetchall()
         return frozenset(row[0] for row in rows)
 
+    def keep_texts(self, observation: str, texts: Iterable[LabelValue], asked: str) -> None:
+        """What was found printed in the picture of a look (by its id), searched for as `asked` says; in place
+        of what an earlier search found."""
+        with self._transaction():
+            keep_texts(self._db, observation, texts, asked)
+
+    def was_searched(self, observation: str, asked: str) -> bool:
+        """Whether the picture of a look was searched for text in this way already."""
+        with self._reading():
+            return was_searched(self._db, observation, asked)
+
     def _insert(self, seen: Observation, standing: int) -> None:
         pose = seen.pose
         node = pose.node if pose else ""
@@ -304,19 +324,24 @@ class SqliteStore:
                 symbology, text, (), bool(sure), agreeing, quality, _elements(gs1), module_px=module_px
             )
             reads.setdefault(seen, []).append(read)
+        texts = kept_texts(self._db)
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
             "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "
             "WHERE ?1 IS NULL OR location = ?1 ORDER BY utc_ns, id",
             (location,),
         )
-        return [(_observation(row[:-1], tuple(reads.get(row[0], ()))), row[-1]) for row in rows]
+        return [
+            (_observation(row[:-1], tuple(reads.get(row[0], ())), texts.get(row[0], ())), row[-1])
+            for row in rows
+        ]
 
     def merge(self, other: SqliteStore) -> int:
         """Take in everything of another store, pictures included; returns how many looks were new."""
         with other._reading():
             planned = [PlannedLocation(record.code, record.node) for record in other.locations()]
             seen = other._observations()
+            searched = all_searches(other._db)
         for observation, _ in seen:
             if observation.evidence and other.evidence.path(observation.evidence).exists():
                 self.evidence.keep(other.evidence.path(observation.evidence).read_bytes())
@@ -326,6 +351,7 @@ class SqliteStore:
             self._db.executemany("INSERT OR IGNORE INTO location VALUES (?, ?)", rows)
             for observation, standing in seen:
                 self._insert(observation, standing)
+            merge_texts(self._db, searched)
             after = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
         return int(after - before)
 
@@ -340,7 +366,10 @@ def _elements(gs1: str) -> tuple[tuple[str, str], ...]:
     return elements
 
 
-def _observation(row: tuple[Any, ...], reads: tuple[CodeRead, ...]) -> Observation:
+def _observation(
+    row: tuple[Any, ...], reads: tuple[CodeRead, ...], texts: tuple[LabelValue, ...]
+) -> Observation:
     _, run, location, utc_ns, state, confidence, evidence, node, *place = row
     pose = None if node is None else CountPose(node, *place)
-    return Observation(run, location, utc_ns, LocationState(state), confidence, reads, pose, evidence)
+    seen = LocationState(state)
+    return Observation(run, location, utc_ns, seen, confidence, reads, pose, evidence, texts)

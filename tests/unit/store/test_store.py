@@ -224,10 +224,8 @@ def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path:
         assert [kept.id for kept in other.history(seen.location)] == [seen.id]
 
 
-OLDER = {
-    1: ("ALTER TABLE observation DROP COLUMN standing", "ALTER TABLE code_read DROP COLUMN module_px"),
-    2: ("ALTER TABLE code_read DROP COLUMN module_px",),
-}
+TO_2 = ("ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
+OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2}
 
 
 @pytest.mark.parametrize("version", OLDER)
