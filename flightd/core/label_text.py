@@ -22,9 +22,11 @@ class TextLook:
 @dataclass(frozen=True, slots=True)
 class TextLine:
     """A line with its corners in centred coordinates (left top, clockwise).  `open_left` and `open_right` say
-    that it may go on there: it touches something, the light burns it out, or the picture ends."""
+    that it may go on there: it touches something, the light burns it out, or the picture ends; `burnt`, that
+    the light may have taken characters out of it."""
 
     corners_px: Quad
     looks: tuple[TextLook, ...]
     open_left: bool = False
     open_right: bool = False
+    burnt: bool = False

@@ -34,8 +34,8 @@ _JOINED_GAP: Final = 1.2
 _END: Final = 0.15
 """Part of the height beyond each end of a line that must be plain paper."""
 _BURNT: Final = 252
-_GLARE: Final = 0.8
-"""Part of its height from which on a burnt stretch of a line is more than a gap between words."""
+_MOST_BURNT: Final = 0.10
+"""Part of a line that may be as white as can be, by noise."""
 
 
 class TextReader:
@@ -72,9 +72,9 @@ class TextReader:
 
     def _line(self, region: Image, strip: _Strip, centre: tuple[float, float]) -> TextLine:
         looks = tuple(self._look(strip.cut_out(region, *room)) for room in _ROOMS)
-        left, right = strip.open_ends(region)
+        left, right, burnt = strip.doubts(region)
         corners = tuple((round(x - centre[0], 1), round(y - centre[1], 1)) for x, y in strip.corners())
-        return TextLine(corners, looks, left, right)
+        return TextLine(corners, looks, left, right, burnt)
 
     def _look(self, line: Image) -> TextLook:
         out = self._engine(line, use_det=False, use_cls=False, use_rec=True, return_word_box=True)
@@ -124,8 +124,9 @@ class _Strip:
         strip = cv2.warpAffine(region, turn, (width, _LINE_PX), flags=flags, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(strip, np.uint8)
 
-    def open_ends(self, region: Image) -> tuple[bool, bool]:
-        """Whether something goes on beyond the left end, and beyond the right one."""
+    def doubts(self, region: Image) -> tuple[bool, bool, bool]:
+        """Whether something may go on beyond the left end, beyond the right one, and whether light has burnt
+        out a part of the line."""
         room = _END + 0.05
         grey = cv2.cvtColor(self.cut_out(region, room, 0.0), cv2.COLOR_BGR2GRAY)
         wide = max(2, round(_END * _LINE_PX))
@@ -138,8 +139,7 @@ class _Strip:
             dark = float(np.percentile(end, 5)) < paper - 0.5 * (paper - ink)
             burnt = float(np.median(end)) >= _BURNT
             ends.append(bool(dark or burnt or not corners.all()))
-        lost = _longest_run(grey.min(axis=0) >= _BURNT) > _GLARE * _LINE_PX  # characters may be, in there
-        return ends[0] or lost, ends[1] or lost
+        return ends[0], ends[1], float((grey >= _BURNT).mean()) > _MOST_BURNT
 
     def with_piece(self, other: _Strip) -> _Strip:
         """Both as one line, this one left of the other."""
@@ -158,12 +158,6 @@ class _Strip:
         way = other.corners()[[0, 3]].mean(axis=0) - self.corners()[[1, 2]].mean(axis=0)
         gap, off = float(way @ self.along), float(way @ self.down)
         return -height < gap < _JOINED_GAP * height and abs(off) < 0.4 * height
-
-
-def _longest_run(flags: NDArray[np.bool_]) -> int:
-    """How many in a row are set, at most."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _joined(strips: Sequence[_Strip]) -> list[_Strip]:

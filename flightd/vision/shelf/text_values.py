@@ -69,7 +69,9 @@ def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> tuple[Tol
     if not meant:
         return None, 0.0
     value, (start, end, reading) = next(iter(meant.items()))
-    more_right = line.open_right and end == len(look.text) and _fits_longer(look.text, end, pattern)
+    more_right = (line.burnt or (line.open_right and end == len(look.text))) and _fits_longer(
+        look.text, end, pattern
+    )
     more_left = line.open_left and start == 0 and _fits_longer(look.text, 0, pattern)
     if len(meant) > 1 or more_right or more_left:
         return value, 0.0

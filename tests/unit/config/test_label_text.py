@@ -35,6 +35,6 @@ def test_patterns_are_read() -> None:
     ],
 )
 def test_what_cannot_say_one_value_is_refused(text: dict[str, Any], words: str) -> None:
-    with pytest.raises(InputError, match="scan.text") as refused:
+    with pytest.raises(InputError, match=r"scan\.text") as refused:
         config_with(**text)
     assert words in str(refused.value)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import date
 from decimal import Decimal
 
 import pytest
 
 from flightd.core.inventory import LocationState, Observation
-from flightd.core.label_values import PlaceValue, Told, UnknownReason
+from flightd.core.label_values import LabelValue, PlaceValue, Told, UnknownReason, ValueKind, ValueSource
 from flightd.core.types import CodeRead
 from flightd.inventory.export.value_columns import VALUE_COLUMNS, value_cells
 from flightd.inventory.place_values import code_values, place_values
@@ -68,6 +69,36 @@ def test_a_day_that_there_is_not_is_unknown() -> None:
     for demanded in (0.7, 0.0):
         values = place_values(look(code("x", a17="260230")), demanded)
         assert told(values) == {"expiry": UnknownReason.UNSURE}
+
+
+LOT = LabelValue(ValueKind.LOT, "B1", "", ValueSource.TEXT, 0.95)
+
+
+@pytest.mark.parametrize(
+    ("reads", "texts", "lot"),
+    [
+        ((), (LOT,), "B1"),
+        ((), (replace(LOT, confidence=0.89),), UnknownReason.UNSURE),
+        ((), (LOT, replace(LOT, value="B2")), UnknownReason.CONTRADICTING),
+        ((code("x", a10="B9"),), (), "B9"),
+        ((code("x", a10="B9"),), (replace(LOT, confidence=0.5),), "B9"),
+        ((code("x", a10="B9"),), (LOT,), UnknownReason.CONTRADICTING),
+        ((code("x", a01="09501101530003"),), (LOT,), "B1"),
+    ],
+)
+def test_text_comes_second_and_two_sources_must_not_differ(
+    reads: tuple[CodeRead, ...], texts: tuple[LabelValue, ...], lot: Told
+) -> None:
+    state = LocationState.READ if reads else LocationState.UNREADABLE
+    seen = Observation("r", "A-1", AT, state, 0.99, reads, texts=texts)
+    assert told(place_values(seen, 0.5)) == {"lot": lot}
+
+
+def test_where_both_say_the_same_the_code_is_the_source() -> None:
+    seen = replace(look(code("x", a10="B1"), confidence=0.9), texts=(LOT,))
+    (value,) = place_values(seen)
+    assert value.known is not None
+    assert (value.known.source, value.known.confidence) == (ValueSource.GS1, 0.9)
 
 
 def test_a_table_has_a_cell_for_each() -> None:
