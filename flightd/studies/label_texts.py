@@ -9,6 +9,7 @@ from pathlib import Path
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.errors import InputError
+from flightd.core.inventory import LocationState
 from flightd.core.label_text import TextLine, TextLook
 from flightd.core.label_values import LEAST_TEXT_CONFIDENCE, LabelValue, told_text
 from flightd.core.types import Image
@@ -44,13 +45,14 @@ def search_inventory(
     *,
     again: bool = False,
 ) -> SearchedTexts:
-    """Search the picture of every location's newest look; one searched with the same patterns before only
-    `again`."""
+    """Search the picture of every location's newest look, but for empty ones; what was searched with the same
+    patterns before only `again`."""
     asked = search_name(patterns)
-    looks = [record.observation for record in store.locations() if record.observation]
+    newest = [record.observation for record in store.locations() if record.observation]
+    looks = [look for look in newest if look.evidence and look.state is not LocationState.EMPTY]
     searched = before = lost = 0
     found: list[LabelValue] = []
-    for seen in track([look for look in looks if look.evidence], "reading text"):
+    for seen in track(looks, "reading text"):
         if not again and store.was_searched(seen.id, asked):
             before += 1
             continue

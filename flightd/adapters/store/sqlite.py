@@ -40,6 +40,8 @@ from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
 _VERSION = 3
+_READABLE = 2
+"""The format before it is read as it is: nothing but module sizes and printed text is missing."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
 _TAKEN_OVER = {
@@ -95,6 +97,7 @@ class SqliteStore:
         self._file = folder / "inventory.db"
         if not create and not self._file.exists():
             raise InputError(f"{folder}: holds no inventory.db; give the folder of an inventory")
+        self._version = _VERSION
         self._lock = threading.RLock()
         self.evidence = EvidenceFolder(folder / "evidence")
         try:
@@ -121,7 +124,8 @@ class SqliteStore:
             version, application = self._marks()
             if application != _APPLICATION:
                 raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
-            if version != _VERSION:
+            self._version = version
+            if version not in {_READABLE, _VERSION}:
                 older = version in _TAKEN_OVER
                 remedy = f"flightd inventory show {self.folder}" if older else "the flightd that wrote it"
                 problem = f"format {version}, known here is {_VERSION}"
@@ -316,15 +320,16 @@ class SqliteStore:
     def _observations(self, location: str | None = None) -> list[tuple[Observation, int]]:
         """All looks, or those at one location, with their standing, oldest first."""
         reads: dict[str, list[CodeRead]] = {}
+        module = "module_px" if self._version == _VERSION else "NULL"
         for seen, symbology, text, sure, agreeing, quality, gs1, module_px in self._db.execute(
-            "SELECT observation, symbology, text, sure, agreeing, quality, gs1, module_px FROM code_read "
+            f"SELECT observation, symbology, text, sure, agreeing, quality, gs1, {module} FROM code_read "  # noqa: S608
             "ORDER BY observation, number"
         ):
             read = CodeRead(
                 symbology, text, (), bool(sure), agreeing, quality, _elements(gs1), module_px=module_px
             )
             reads.setdefault(seen, []).append(read)
-        texts = kept_texts(self._db)
+        texts = kept_texts(self._db) if self._version == _VERSION else {}
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
             "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "
@@ -341,7 +346,7 @@ class SqliteStore:
         with other._reading():
             planned = [PlannedLocation(record.code, record.node) for record in other.locations()]
             seen = other._observations()
-            searched = all_searches(other._db)
+            searched = all_searches(other._db) if other._version == _VERSION else []
         for observation, _ in seen:
             if observation.evidence and other.evidence.path(observation.evidence).exists():
                 self.evidence.keep(other.evidence.path(observation.evidence).read_bytes())

@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from typing import Self
 
 from flightd.core.errors import UnavailableError
-from flightd.core.inventory import CountPose, Observation
+from flightd.core.inventory import CountPose, LocationState, Observation
 from flightd.core.scanning import Finding, Settled
 from flightd.ports import Clock, Store
 from flightd.runtime.clock import Hold
@@ -19,6 +19,10 @@ _MOST_WAITING = 20_000
 _MOST_PICTURES = 400
 _TELL_NS = 10_000_000_000
 _FIRST_WAIT_S, _LONGEST_WAIT_S = 0.2, 5.0
+
+
+def _is_empty(finding: Finding) -> bool:
+    return finding.state is LocationState.EMPTY
 
 
 def nobody(_observation: str, _jpeg: bytes) -> None:
@@ -45,7 +49,7 @@ class StoreWriter:
         hold: Hold = nullcontext,
         on_written: Callable[[str, bytes], None] = nobody,
     ) -> None:
-        """`on_written` is told the id and the picture of what `run` has put on the disk."""
+        """`on_written` is told id and picture of what `run` has put on the disk, empty places aside."""
         self._store = store
         self._on_written = on_written
         self._run = run
@@ -109,7 +113,7 @@ class StoreWriter:
                     continue
                 wait_s = _FIRST_WAIT_S
                 self._forget()
-                if written and isinstance(entry, tuple) and entry[1]:
+                if written and isinstance(entry, tuple) and entry[1] and not _is_empty(entry[0]):
                     self._on_written(written, entry[1])
             self._arrived.clear()
             await self._arrived.wait()

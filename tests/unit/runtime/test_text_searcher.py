@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -60,7 +61,9 @@ def test_what_is_counted_is_searched_and_kept_with_its_look(tmp_path: Path) -> N
             tasks = [asyncio.create_task(texts.run()), asyncio.create_task(writer.run(said.append))]
             writer.put(finding(1), b"a picture")
             writer.put(finding(2), b"")
-            await until(lambda: texts.searched == 1 and writer.written == 2, within_s=60)
+            writer.put(replace(finding(3), state=LocationState.EMPTY), b"another picture")
+            await until(lambda: texts.searched == 1 and writer.written == 3, within_s=60)
+            assert texts.unsearched == 0
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
