@@ -15,7 +15,7 @@ from flightd.core.label_values import LEAST_TEXT_CONFIDENCE, LabelValue, told_te
 from flightd.core.types import Image
 from flightd.studies.progress_bar import track
 from flightd.vision.shelf.text_reader import TextReader
-from flightd.vision.shelf.text_search import search_name
+from flightd.vision.shelf.text_search import BrokenPictureError, search_name
 from flightd.vision.shelf.text_values import text_values
 
 
@@ -58,7 +58,7 @@ def search_inventory(
             continue
         try:
             values = search(store.evidence.path(seen.evidence).read_bytes())
-        except (OSError, ValueError):
+        except (OSError, BrokenPictureError):
             lost += 1
             continue
         store.keep_texts(seen.id, values, asked)

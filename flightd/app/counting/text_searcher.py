@@ -17,7 +17,7 @@ from flightd.core.extras import missing_extra
 from flightd.core.label_values import LabelValue
 from flightd.runtime.child_process import Child
 from flightd.runtime.clock import Hold
-from flightd.vision.shelf.text_search import TextSearch, search_name
+from flightd.vision.shelf.text_search import BrokenPictureError, TextSearch, search_name
 
 _MOST_WAITING = 200
 """Pictures of 50 KB at most."""
@@ -140,7 +140,7 @@ def _searching(patterns: Sequence[LabelTextConfig]) -> Callable[[bytes], tuple[L
     def searched(jpeg: bytes) -> tuple[LabelValue, ...] | None:
         try:
             return search(jpeg)
-        except ValueError:
+        except BrokenPictureError:
             return None
 
     return searched

@@ -86,7 +86,7 @@ class TextReader:
         return TextLook(text, tuple(map(float, sure)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Strip:
     """A line in pixels of its region: middle, direction (a unit vector to the right), length, height."""
 

@@ -25,6 +25,10 @@ def search_name(patterns: Sequence[LabelTextConfig]) -> str:
     return hashlib.sha256(asked.encode()).hexdigest()[:16]
 
 
+class BrokenPictureError(ValueError):
+    """There is nothing to search: it is no JPEG, or a damaged one."""
+
+
 class TextSearch:
     """Called with a picture (JPEG) it gives the values that the patterns find in it.  UnavailableError where
     the extra `ocr` is missing."""
@@ -34,11 +38,11 @@ class TextSearch:
         self._reader = TextReader()
 
     def __call__(self, jpeg: bytes) -> tuple[LabelValue, ...]:
-        """ValueError for what is no picture."""
+        """BrokenPictureError for what is no picture."""
         size = jpeg_size(jpeg)
         if size is None or size[0] * size[1] > MOST_PIXELS:
-            raise ValueError("no picture that can be read")
+            raise BrokenPictureError("no picture that can be read")
         bgr = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
         if bgr is None:
-            raise ValueError("a damaged picture")
+            raise BrokenPictureError("a damaged picture")
         return text_values(self._reader.read(np.asarray(bgr, np.uint8)), self._patterns)

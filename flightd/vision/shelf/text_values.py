@@ -1,7 +1,8 @@
 """What lines of printed text say of the goods, by the site's patterns: only what can mean one thing.
 
 O and 0, I, l and 1 are the same in many fonts: each is read as any of them, and where more than one reading
-fits a pattern, none is believed.  Where one does, it is meant: `L0T 4O1` is `LOT 401` for `LOT (\\d+)`.
+fits a pattern, none is believed.  Where one does, it is meant (`L0T 401` is `LOT 401`); a value that had to
+be read so itself is less sure.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource
 _ALIKE: Final = {character: group for group in ("O0", "Il1") for character in group}
 _MOST_READINGS: Final = 4096
 _REPAIRED: Final = 0.85
-"""Part of its confidence that a value keeps in which an I, l or 1 was taken for another of them: a cut J or T
-looks like that, too."""
+"""Part of its confidence that a value keeps in which a character was taken for one that looks like it: a cut
+J was read as an I, a 9 in glare as an O."""
 _LONGEST: Final = 120
 """Characters of a line; what is longer is no line of a label."""
 
@@ -75,8 +76,8 @@ def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> tuple[Tol
     more_left = line.open_left and start == 0 and _fits_longer(look.text, 0, pattern)
     if len(meant) > 1 or more_right or more_left:
         return value, 0.0
-    strokes = any(a != b and a in "Il1" for a, b in zip(look.text[start:end], reading, strict=True))
-    return value, min(look.sure[start:end]) * (_REPAIRED if strokes else 1.0)
+    repaired = look.text[start:end] != reading
+    return value, min(look.sure[start:end]) * (_REPAIRED if repaired else 1.0)
 
 
 def _readings(text: str) -> Iterator[str] | None:

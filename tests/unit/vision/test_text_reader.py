@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -19,6 +21,8 @@ from flightd.core.label_values import told_text
 from flightd.core.types import Image
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg
 from flightd.vision.shelf.label_regions import label_regions
+from flightd.vision.shelf.text_reader import TextReader
+from flightd.vision.shelf.text_search import BrokenPictureError, TextSearch
 from flightd.vision.shelf.text_values import text_values
 
 CONFIG = """
@@ -60,19 +64,47 @@ def test_a_region_is_looked_at_that_is_bright_and_written_on() -> None:
 
 
 def test_without_the_extra_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys
-
-    from flightd.vision.shelf.text_reader import TextReader
-
     monkeypatch.setitem(sys.modules, "rapidocr", None)
     with pytest.raises(UnavailableError, match=r"reading text needs what is not installed \(extra ocr\)"):
         TextReader()
 
 
+def boxes(*corners: tuple[int, int, int, int]) -> list[list[tuple[int, int]]]:
+    return [[(x0, y0), (x1, y0), (x1, y1), (x0, y1)] for x0, y0, x1, y1 in corners]
+
+
+def test_pieces_of_a_line_are_one_and_a_broken_picture_is_no_fault_of_the_reader(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With an engine that finds boxes and tells the width of what it is given to read."""
+
+    class Engine:
+        def __init__(self, **_: object) -> None:
+            pass
+
+        def __call__(self, bgr: Image, use_det: bool, **_: object) -> SimpleNamespace:
+            if use_det:
+                # two pieces of one line, right one first, and a line below
+                return SimpleNamespace(boxes=boxes((90, 20, 150, 40), (20, 21, 80, 41), (20, 60, 100, 80)))
+            words = [SimpleNamespace(confs=[1.0] * len(str(bgr.shape[1])))]
+            return SimpleNamespace(txts=[str(bgr.shape[1])], word_results=words)
+
+    monkeypatch.setitem(sys.modules, "rapidocr", SimpleNamespace(RapidOCR=Engine))
+    search = TextSearch((LabelTextConfig(kind="quantity", pattern=r"(\d+)"),))
+    picture = np.full((120, 200, 3), 235, np.uint8)  # no label stands out: the whole is looked at
+    lines = TextReader().read(picture)
+    assert len(lines) == 2
+    # 130 px long and 20 high, with 0.35 and 0.6 of that at both ends, 0.05 and 0.15 above and below
+    widths = [round(144 * 48 / 22), round(154 * 48 / 26)]
+    assert [look.text for look in lines[0].looks] == list(map(str, widths))
+    assert search(evidence_jpeg(picture))
+    for broken in (b"no picture", evidence_jpeg(picture)[:200]):
+        with pytest.raises(BrokenPictureError):
+            search(broken)
+
+
 def test_lines_are_read_and_a_cut_one_is_not_believed() -> None:
     pytest.importorskip("rapidocr")
-    from flightd.vision.shelf.text_reader import TextReader
-
     reader = TextReader()
     lot = LabelTextConfig(kind="lot", pattern=r"LOT\s*([A-Z]\d+)")
     whole = reader.read(shelf("LOT B2345"))
