@@ -22,11 +22,12 @@ class TextLook:
 @dataclass(frozen=True, slots=True)
 class TextLine:
     """A line with its corners in centred coordinates (left top, clockwise).  `open_left` and `open_right` say
-    that it may go on there: it touches something, the light burns it out, or the picture ends; `burnt`, that
-    the light may have taken characters out of it."""
+    that it may go on there: it touches something, the light burns it out, or the picture ends; `gap`, that
+    the light may have taken characters out of it.  `glare` is the part of it that is burnt out."""
 
     corners_px: Quad
     looks: tuple[TextLook, ...]
     open_left: bool = False
     open_right: bool = False
-    burnt: bool = False
+    gap: bool = False
+    glare: float = 0.0

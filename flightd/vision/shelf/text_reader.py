@@ -34,8 +34,12 @@ _JOINED_GAP: Final = 1.2
 _END: Final = 0.15
 """Part of the height beyond each end of a line that must be plain paper."""
 _BURNT: Final = 252
-_MOST_BURNT: Final = 0.10
-"""Part of a line that may be as white as can be, by noise."""
+_SMOOTH_PX: Final = 1.5
+_WHITE: Final = 245
+_LOST_END_PX: Final = 10
+_LOST_PX: Final = 12
+"""So many columns in a row, at an end or within, that have nothing darker (in grey levels, the noise smoothed)
+are where glare may have taken characters."""
 
 
 class TextReader:
@@ -72,9 +76,9 @@ class TextReader:
 
     def _line(self, region: Image, strip: _Strip, centre: tuple[float, float]) -> TextLine:
         looks = tuple(self._look(strip.cut_out(region, *room)) for room in _ROOMS)
-        left, right, burnt = strip.doubts(region)
+        doubts = strip.doubts(region)
         corners = tuple((round(x - centre[0], 1), round(y - centre[1], 1)) for x, y in strip.corners())
-        return TextLine(corners, looks, left, right, burnt)
+        return TextLine(corners, looks, doubts.left, doubts.right, doubts.gap, round(doubts.glare, 3))
 
     def _look(self, line: Image) -> TextLook:
         out = self._engine(line, use_det=False, use_cls=False, use_rec=True, return_word_box=True)
@@ -84,6 +88,16 @@ class TextReader:
         if len(text) != len(sure):  # what cannot be told apart is sure to nobody
             return TextLook(text, (0.0,) * len(text))
         return TextLook(text, tuple(map(float, sure)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Doubts:
+    """As `TextLine` has them."""
+
+    left: bool
+    right: bool
+    gap: bool
+    glare: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,9 +138,8 @@ class _Strip:
         strip = cv2.warpAffine(region, turn, (width, _LINE_PX), flags=flags, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(strip, np.uint8)
 
-    def doubts(self, region: Image) -> tuple[bool, bool, bool]:
-        """Whether something may go on beyond the left end, beyond the right one, and whether light has burnt
-        out a part of the line."""
+    def doubts(self, region: Image) -> _Doubts:
+        """What may be wrong with the line, whatever is read in it."""
         room = _END + 0.05
         grey = cv2.cvtColor(self.cut_out(region, room, 0.0), cv2.COLOR_BGR2GRAY)
         wide = max(2, round(_END * _LINE_PX))
@@ -134,12 +147,16 @@ class _Strip:
         outside = self.corners(room)
         size = np.array((region.shape[1], region.shape[0]))
         inside: NDArray[np.bool_] = np.all((outside >= 0) & (outside < size), axis=1)
+        smooth = np.asarray(cv2.GaussianBlur(grey, (0, 0), _SMOOTH_PX), np.uint8)
+        lightest = smooth.min(axis=0)
         ends = []
-        for end, corners in ((grey[:, :wide], inside[[0, 3]]), (grey[:, -wide:], inside[[1, 2]])):
-            dark = float(np.percentile(end, 5)) < paper - 0.5 * (paper - ink)
-            burnt = float(np.median(end)) >= _BURNT
-            ends.append(bool(dark or burnt or not corners.all()))
-        return ends[0], ends[1], float((grey >= _BURNT).mean()) > _MOST_BURNT
+        for end, corners in ((slice(wide), inside[[0, 3]]), (slice(-wide, None), inside[[1, 2]])):
+            dark = float(np.percentile(grey[:, end], 5)) < paper - 0.5 * (paper - ink)
+            columns = lightest[:_LOST_END_PX] if end.start is None else lightest[-_LOST_END_PX:]
+            ends.append(bool(dark or not corners.all() or columns.min() >= _WHITE))
+        within = lightest[_LOST_END_PX:-_LOST_END_PX] >= _WHITE
+        glare = float((grey >= _BURNT).mean())
+        return _Doubts(ends[0], ends[1], _longest_run(within) >= _LOST_PX, glare)
 
     def with_piece(self, other: _Strip) -> _Strip:
         """Both as one line, this one left of the other."""
@@ -158,6 +175,12 @@ class _Strip:
         way = other.corners()[[0, 3]].mean(axis=0) - self.corners()[[1, 2]].mean(axis=0)
         gap, off = float(way @ self.along), float(way @ self.down)
         return -height < gap < _JOINED_GAP * height and abs(off) < 0.4 * height
+
+
+def _longest_run(flags: NDArray[np.bool_]) -> int:
+    """How many in a row are set, at most."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _joined(strips: Sequence[_Strip]) -> list[_Strip]:

@@ -24,6 +24,8 @@ _MOST_READINGS: Final = 4096
 _REPAIRED: Final = 0.85
 """Part of its confidence that a value keeps in which a character was taken for one that looks like it: a cut
 J was read as an I, a 9 in glare as an O."""
+_LOST_TO_GLARE: Final = 0.2
+"""And that it loses in a line that is burnt out altogether: what is left of a 9 is a 0."""
 _LONGEST: Final = 120
 """Characters of a line; what is longer is no line of a label."""
 
@@ -70,14 +72,14 @@ def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> tuple[Tol
     if not meant:
         return None, 0.0
     value, (start, end, reading) = next(iter(meant.items()))
-    more_right = (line.burnt or (line.open_right and end == len(look.text))) and _fits_longer(
+    more_right = (line.gap or (line.open_right and end == len(look.text))) and _fits_longer(
         look.text, end, pattern
     )
     more_left = line.open_left and start == 0 and _fits_longer(look.text, 0, pattern)
     if len(meant) > 1 or more_right or more_left:
         return value, 0.0
-    repaired = look.text[start:end] != reading
-    return value, min(look.sure[start:end]) * (_REPAIRED if repaired else 1.0)
+    part = (_REPAIRED if look.text[start:end] != reading else 1.0) * (1.0 - _LOST_TO_GLARE * line.glare)
+    return value, min(look.sure[start:end]) * part
 
 
 def _readings(text: str) -> Iterator[str] | None:

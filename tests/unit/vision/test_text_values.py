@@ -95,10 +95,14 @@ def test_what_may_go_on_beyond_the_line_is_sure_only_where_its_length_is_known()
     assert told(QUANTITY, line("QTY 48 PCS", "QTY 48 PCS", right=True)) == [(Decimal(48), 0.99)]
     assert told(LOT, line("LOT B12345", "LOT B12345", right=True)) == [("B12345", 0.99)]
     assert told(EXPIRY, line("EXP 31.12.2026", "EXP 31.12.2026", right=True)) == [(date(2026, 12, 31), 0.99)]
-    burnt = replace(line("QTY 48 PCS", "QTY 48 PCS"), burnt=True)
-    assert told(QUANTITY, burnt) == [(Decimal(48), 0.0)], "it may be 428"
+    gappy = replace(line("QTY 48 PCS", "QTY 48 PCS"), gap=True)
+    assert told(QUANTITY, gappy) == [(Decimal(48), 0.0)], "it may be 428"
     bare = LabelTextConfig(kind="lpn", pattern=r"([A-Z]+)$")
     assert told(bare, line("PQR", "PQR", left=True)) == [("PQR", 0.0)]
+
+
+def test_glare_on_the_line_makes_it_less_sure() -> None:
+    assert told(LOT, replace(line("LOT B1203", "LOT B1203"), glare=0.5)) == [("B1203", 0.891)]
 
 
 def test_one_value_on_two_lines_is_told_once_and_two_values_both() -> None:
