@@ -38,7 +38,7 @@ _SMOOTH_PX: Final = 1.5
 _WHITE: Final = 245
 _LOST_END_PX: Final = 10
 _LOST_PX: Final = 12
-"""So many columns in a row, at an end or within, that have nothing darker (in grey levels, noise smoothed) are
+"""So many columns in a row, at an end or within, that have nothing darker (grey levels, noise smoothed) are
 where glare may have taken characters."""
 
 

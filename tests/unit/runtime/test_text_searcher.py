@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import importlib.util
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -73,6 +75,14 @@ def test_what_is_counted_is_searched_and_kept_with_its_look(tmp_path: Path) -> N
     said: list[str] = []
     real(flight())
     assert said == []
+
+
+def test_without_the_extra_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    words = r"\[\[scan\.text\]\]: printed text is not read, it needs what is not installed \(extra ocr\)"
+    assert re.match(words, str(text_searcher.needs_extra()))
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
+    assert text_searcher.needs_extra() is None
 
 
 def test_what_is_not_searched_is_counted_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
