@@ -79,7 +79,8 @@ def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> tuple[Tol
     if len(meant) > 1 or more_right or more_left:
         return value, 0.0
     part = (_REPAIRED if look.text[start:end] != reading else 1.0) * (1.0 - _LOST_TO_GLARE * line.glare)
-    return value, min(look.sure[start:end]) * part
+    touching = look.text[end : end + 1].strip()  # what is left of another character of the value, perhaps
+    return value, min(look.sure[start : end + len(touching)]) * part
 
 
 def _readings(text: str) -> Iterator[str] | None:

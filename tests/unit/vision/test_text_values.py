@@ -74,6 +74,12 @@ def test_the_least_sure_character_counts_and_both_looks_must_agree() -> None:
     assert told(LOT, line("LOT B1203", "LOT B12"))[0][1] == 0.0
 
 
+def test_what_touches_the_value_must_be_sure_too() -> None:
+    remnant = TextLook("QTY 48-", (0.99,) * 6 + (0.45,))
+    assert told(QUANTITY, TextLine((), (remnant, remnant))) == [(Decimal(48), 0.45)]
+    assert told(QUANTITY, line("QTY 48, OK", "QTY 48, OK")) == [(Decimal(48), 0.99)]
+
+
 @pytest.mark.parametrize(
     ("pattern", "text", "value"),
     [
