@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from flightd.cli.options import AsJson, Pictures
 from flightd.cli.tables import stdout
+from flightd.core.errors import InputError
+
+if TYPE_CHECKING:
+    from flightd.studies.label_texts import PictureTexts
 
 
 def register(app: typer.Typer) -> None:
@@ -21,6 +25,10 @@ def codes(
     paths: Pictures,
     labels: Annotated[
         Path | None, typer.Option(metavar="F", help="Compare with the texts that this JSON file expects.")
+    ] = None,
+    text: Annotated[bool, typer.Option("--text", help="Read printed lines, too (extra `ocr`).")] = False,
+    config: Annotated[
+        Path | None, typer.Option(metavar="F", help="Configuration whose [[scan.text]] says what lines mean.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -37,11 +45,15 @@ def codes(
       flightd codes label.jpg
       flightd codes shelf/ --json
       flightd codes photographs/ --labels photographs/codes.json
+      flightd codes photographs/ --text --config hall.toml
     """
     from flightd.studies import codes as command
 
+    if config is not None and not text:
+        raise InputError("says what printed lines mean", key="--config", remedy="add --text")
+    texts = _texts(config) if text else None
     expected = command.read_expected(labels) if labels else None
-    pictures = command.read(paths)
+    pictures = command.read(paths, texts)
     if as_json:
         sys.stdout.write(command.as_json(list(pictures), expected) + "\n")
         return
@@ -52,3 +64,14 @@ def codes(
         shown.append(picture)
     if expected is not None:
         command.print_verdict(command.compare(shown, expected), console)
+
+
+def _texts(config: Path | None) -> PictureTexts:
+    """What reads printed lines, by the patterns of a configuration if one is given."""
+    from flightd.config.schema import load_config
+    from flightd.studies.label_texts import PictureTexts, check_patterns
+
+    patterns = load_config(config).scan.text if config else ()
+    if config is not None:
+        check_patterns(patterns, config)
+    return PictureTexts(patterns)

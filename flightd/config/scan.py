@@ -6,6 +6,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
+from flightd.config.label_text import LabelTextConfig
 from flightd.config.section import Section, unit
 from flightd.config.sweep import ScanMode, SweepConfig
 
@@ -77,6 +78,7 @@ class ScanConfig(Section):
     timeout_s: float = Field(3.0, gt=0.05, le=30, description="a reader that takes longer is replaced")
     sweep: SweepConfig = SweepConfig()
     expert: ScanExpert = ScanExpert()
+    text: tuple[LabelTextConfig, ...] = ()
 
     @model_validator(mode="after")
     def _heights_in_order(self) -> Self:

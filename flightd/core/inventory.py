@@ -11,6 +11,7 @@ import json
 import math
 from dataclasses import dataclass
 
+from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
 
@@ -64,7 +65,8 @@ class Observation:
     """One look at one location: its state, what was read, from where, and how sure (0..1).
 
     `evidence` is the SHA-256 of the picture, in hexadecimal, or empty.  Where in the picture a code was is no
-    part of the record: reads that come from a store have no `corners_px` and no `gs1_problem`.
+    part of the record: reads that come from a store have no `corners_px` and no `gs1_problem`.  `texts` are
+    values of printed text in the picture: they may be looked for later, and do not change the `id`.
     """
 
     run: str
@@ -75,6 +77,7 @@ class Observation:
     reads: tuple[CodeRead, ...] = ()
     pose: CountPose | None = None
     evidence: str = ""
+    texts: tuple[LabelValue, ...] = ()
 
     def __post_init__(self) -> None:
         texts = {read.text for read in self.reads}

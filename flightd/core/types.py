@@ -186,7 +186,8 @@ class CodeRead:
     text; `agreeing` counts the ways of looking at the picture that gave this text; `quality` is 1 for a code
     read from the picture as it is and falls towards 0 with every alteration it took.  `gs1` are the
     (application identifier, value) pairs of a GS1 code or GS1 Digital Link whose check digits hold, and
-    `gs1_problem` says what is wrong with one that is none.
+    `gs1_problem` says what is wrong with one that is none.  `module_px` are the pixels for each of its
+    modules, None where their number is not known.
     """
 
     symbology: str
@@ -197,6 +198,7 @@ class CodeRead:
     quality: float
     gs1: tuple[tuple[str, str], ...] = ()
     gs1_problem: str = ""
+    module_px: float | None = None
 
     @property
     def believed(self) -> bool:

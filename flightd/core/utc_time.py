@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, date, datetime, timedelta
 from typing import Final
 
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
@@ -10,5 +10,13 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 def utc_text(utc_ns: int) -> str:
     """ISO 8601 with milliseconds and Z."""
-    at = _EPOCH + timedelta(microseconds=utc_ns // 1000)
-    return at.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    return _at(utc_ns).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def utc_day(utc_ns: int) -> date:
+    """The day in UTC."""
+    return _at(utc_ns).date()
+
+
+def _at(utc_ns: int) -> datetime:
+    return _EPOCH + timedelta(microseconds=utc_ns // 1000)

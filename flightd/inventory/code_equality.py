@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import re
 
-from flightd.vision.shelf.digital_link import parse_digital_link
+from flightd.vision.shelf.digital_link import link_elements
 from flightd.vision.shelf.gs1 import FNC1, Elements, Gs1Error, has_check_digit, parse_element_string
 
 _AIM = re.compile(r"^\][A-Za-z][0-9A-Za-z]")
@@ -59,7 +59,7 @@ def code_key(text: str) -> str:
 def _elements(text: str) -> Elements:
     """The GS1 elements in it, by whatever notation it is in; none where it has none."""
     if "://" in text[:8]:
-        return _linked(text)
+        return link_elements(text)
     if _PARENTHESISED.match(text):
         return _parsed(_without_parentheses(text))
     found = _parsed(text)
@@ -79,14 +79,6 @@ def _without_parentheses(text: str) -> str:
     parts = _ELEMENT.split(text.replace(FNC1, ""))
     pairs = zip(parts[1::2], parts[2::2], strict=True)
     return "".join(f"{ai}{value.replace(' ', '')}{FNC1}" for ai, value in pairs)
-
-
-def _linked(address: str) -> Elements:
-    """The elements of a GS1 Digital Link; none of any other address, or of one that is damaged."""
-    try:
-        return parse_digital_link(address)
-    except Gs1Error:
-        return ()
 
 
 def _named(elements: Elements) -> str:

@@ -14,9 +14,11 @@ from typing import TypeAlias
 from rich.console import Console
 
 from flightd.core.errors import InputError
+from flightd.core.label_values import told_text
 from flightd.core.terminal_text import visible
 from flightd.core.types import CodeRead
 from flightd.studies.frame_files import all_pictures
+from flightd.studies.label_texts import PictureTexts, PrintedTexts, is_sure, surest, texts_json
 from flightd.vision.shelf.code_reader import read_codes
 
 Expected: TypeAlias = Mapping[str, frozenset[str]]
@@ -25,13 +27,14 @@ Expected: TypeAlias = Mapping[str, frozenset[str]]
 
 @dataclass(frozen=True, slots=True)
 class ReadPicture:
-    """What was read in one picture, and how long it took."""
+    """What was read in one picture, and how long that took; None for texts that nobody asked for."""
 
     name: str
     width_px: int
     height_px: int
     ms: float
     reads: tuple[CodeRead, ...]
+    texts: PrintedTexts | None = None
 
     @property
     def believed(self) -> tuple[CodeRead, ...]:
@@ -54,13 +57,14 @@ class ReadVerdict:
         return self.read / self.expected if self.expected else 1.0
 
 
-def read(paths: Sequence[Path]) -> Iterator[ReadPicture]:
-    """Read every picture that `paths` mean, in order."""
+def read(paths: Sequence[Path], texts: PictureTexts | None = None) -> Iterator[ReadPicture]:
+    """Read every picture that `paths` mean, in order; `texts` reads printed lines, too."""
     for picture in all_pictures(paths, "reading"):
         start = perf_counter()
         reads = read_codes(picture.bgr)
         ms = (perf_counter() - start) * 1e3
-        yield ReadPicture(picture.name, picture.bgr.shape[1], picture.bgr.shape[0], ms, reads)
+        printed = texts(picture.bgr) if texts else None
+        yield ReadPicture(picture.name, picture.bgr.shape[1], picture.bgr.shape[0], ms, reads, printed)
 
 
 def read_expected(path: Path) -> Expected:
@@ -131,6 +135,7 @@ def _image(picture: ReadPicture) -> dict[str, object]:
         }
         for read in picture.believed
     ]
+    printed = picture.texts and {"text": texts_json(picture.texts, picture.width_px, picture.height_px)}
     return {
         "path": picture.name,
         "width": picture.width_px,
@@ -138,6 +143,7 @@ def _image(picture: ReadPicture) -> dict[str, object]:
         "ms": round(picture.ms, 3),
         "codes": codes,
         "doubtful": len(picture.reads) - len(picture.believed),
+        **(printed or {}),
     }
 
 
@@ -158,6 +164,20 @@ def print_picture(picture: ReadPicture, console: Console) -> None:
         console.print("  no code")
     if doubtful:
         console.print(f"  {doubtful} doubtful, not told")
+    if picture.texts is not None:
+        _print_texts(picture.texts, console)
+
+
+def _print_texts(texts: PrintedTexts, console: Console) -> None:
+    """Lines as they are read, and what they say."""
+    for line in texts.lines:
+        look = surest(line)
+        told = f"  line         {visible(look.text)}  ({min(look.sure, default=0.0):.2f})"
+        console.print(told, highlight=False, markup=False, soft_wrap=True)
+    for value in texts.values:
+        text = visible(told_text(value.value)) if is_sure(value) else "unknown"
+        told = f"  {value.kind:<12} {text}  ({value.confidence:.2f})"
+        console.print(told, highlight=False, markup=False, soft_wrap=True)
 
 
 def print_verdict(verdict: ReadVerdict, console: Console) -> None:

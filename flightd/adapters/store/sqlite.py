@@ -18,6 +18,14 @@ from pathlib import Path
 from typing import Any, Self
 
 from flightd.adapters.store.evidence_pictures import EvidenceFolder
+from flightd.adapters.store.label_texts import (
+    TEXT_TABLES,
+    all_searches,
+    keep_texts,
+    kept_texts,
+    merge_texts,
+    was_searched,
+)
 from flightd.adapters.store.read_only import connect_read_only
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
@@ -28,12 +36,19 @@ from flightd.core.inventory import (
     PlannedLocation,
     Standing,
 )
+from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
-_VERSION = 2
+_VERSION = 3
+_READABLE = 2
+"""The format before it is read as it is: nothing but module sizes and printed text is missing."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
-_FROM_1 = "ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1"
+_TAKEN_OVER = {
+    1: ("ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1",),
+    2: ("ALTER TABLE code_read ADD COLUMN module_px REAL", *TEXT_TABLES),
+}
+"""What makes a file of each earlier format one of the next."""
 _SCHEMA = """
 CREATE TABLE location (
     code TEXT PRIMARY KEY,
@@ -60,9 +75,10 @@ CREATE TABLE code_read (
     agreeing INTEGER NOT NULL,
     quality REAL NOT NULL,
     gs1 TEXT NOT NULL,
+    module_px REAL,
     PRIMARY KEY (observation, number)
 ) STRICT, WITHOUT ROWID;
-"""
+""" + "".join(f"{table};\n" for table in TEXT_TABLES)
 
 
 class SqliteStore:
@@ -81,6 +97,7 @@ class SqliteStore:
         self._file = folder / "inventory.db"
         if not create and not self._file.exists():
             raise InputError(f"{folder}: holds no inventory.db; give the folder of an inventory")
+        self._version = _VERSION
         self._lock = threading.RLock()
         self.evidence = EvidenceFolder(folder / "evidence")
         try:
@@ -107,10 +124,10 @@ class SqliteStore:
             version, application = self._marks()
             if application != _APPLICATION:
                 raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
-            if version != _VERSION:
-                remedy = (
-                    f"flightd inventory show {self.folder}" if version == 1 else "the flightd that wrote it"
-                )
+            self._version = version
+            if version not in {_READABLE, _VERSION}:
+                older = version in _TAKEN_OVER
+                remedy = f"flightd inventory show {self.folder}" if older else "the flightd that wrote it"
                 problem = f"format {version}, known here is {_VERSION}"
                 raise InputError(f"{self._file}: {problem}", remedy=f"open it once with {remedy}")
 
@@ -147,8 +164,9 @@ class SqliteStore:
                     self._db.execute(f"PRAGMA application_id = {_APPLICATION}")
                 elif application != _APPLICATION:
                     raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
-                elif version == 1:
-                    self._db.execute(_FROM_1)
+                elif version in _TAKEN_OVER:
+                    for statement in (s for v in range(version, _VERSION) for s in _TAKEN_OVER[v]):
+                        self._db.execute(statement)
                     self._db.execute(f"PRAGMA user_version = {_VERSION}")
                 elif version != _VERSION:
                     problem = f"format {version}, known here is {_VERSION}"
@@ -234,6 +252,17 @@ class SqliteStore:
             ).fetchall()
         return frozenset(row[0] for row in rows)
 
+    def keep_texts(self, observation: str, texts: Iterable[LabelValue], asked: str) -> None:
+        """What was found printed in the picture of a look (by its id), searched for as `asked` says; in place
+        of what an earlier search found."""
+        with self._transaction():
+            keep_texts(self._db, observation, texts, asked)
+
+    def was_searched(self, observation: str, asked: str) -> bool:
+        """Whether the picture of a look was searched for text in this way already."""
+        with self._reading():
+            return was_searched(self._db, observation, asked)
+
     def _insert(self, seen: Observation, standing: int) -> None:
         pose = seen.pose
         node = pose.node if pose else ""
@@ -252,9 +281,19 @@ class SqliteStore:
             )
             return
         self._db.executemany(
-            "INSERT INTO code_read VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO code_read VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
             [
-                (seen.id, i, r.symbology, r.text, r.sure, r.agreeing, r.quality, json.dumps(r.gs1))
+                (
+                    seen.id,
+                    i,
+                    r.symbology,
+                    r.text,
+                    r.sure,
+                    r.agreeing,
+                    r.quality,
+                    json.dumps(r.gs1),
+                    r.module_px,
+                )
                 for i, r in enumerate(seen.reads)
             ],
         )
@@ -281,25 +320,33 @@ class SqliteStore:
     def _observations(self, location: str | None = None) -> list[tuple[Observation, int]]:
         """All looks, or those at one location, with their standing, oldest first."""
         reads: dict[str, list[CodeRead]] = {}
-        for seen, symbology, text, sure, agreeing, quality, gs1 in self._db.execute(
-            "SELECT observation, symbology, text, sure, agreeing, quality, gs1 FROM code_read "
+        module = "module_px" if self._version == _VERSION else "NULL"
+        for seen, symbology, text, sure, agreeing, quality, gs1, module_px in self._db.execute(
+            f"SELECT observation, symbology, text, sure, agreeing, quality, gs1, {module} FROM code_read "  # noqa: S608
             "ORDER BY observation, number"
         ):
-            read = CodeRead(symbology, text, (), bool(sure), agreeing, quality, _elements(gs1))
+            read = CodeRead(
+                symbology, text, (), bool(sure), agreeing, quality, _elements(gs1), module_px=module_px
+            )
             reads.setdefault(seen, []).append(read)
+        texts = kept_texts(self._db) if self._version == _VERSION else {}
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
             "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "
             "WHERE ?1 IS NULL OR location = ?1 ORDER BY utc_ns, id",
             (location,),
         )
-        return [(_observation(row[:-1], tuple(reads.get(row[0], ()))), row[-1]) for row in rows]
+        return [
+            (_observation(row[:-1], tuple(reads.get(row[0], ())), texts.get(row[0], ())), row[-1])
+            for row in rows
+        ]
 
     def merge(self, other: SqliteStore) -> int:
         """Take in everything of another store, pictures included; returns how many looks were new."""
         with other._reading():
             planned = [PlannedLocation(record.code, record.node) for record in other.locations()]
             seen = other._observations()
+            searched = all_searches(other._db) if other._version == _VERSION else []
         for observation, _ in seen:
             if observation.evidence and other.evidence.path(observation.evidence).exists():
                 self.evidence.keep(other.evidence.path(observation.evidence).read_bytes())
@@ -309,6 +356,7 @@ class SqliteStore:
             self._db.executemany("INSERT OR IGNORE INTO location VALUES (?, ?)", rows)
             for observation, standing in seen:
                 self._insert(observation, standing)
+            merge_texts(self._db, searched)
             after = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
         return int(after - before)
 
@@ -323,7 +371,10 @@ def _elements(gs1: str) -> tuple[tuple[str, str], ...]:
     return elements
 
 
-def _observation(row: tuple[Any, ...], reads: tuple[CodeRead, ...]) -> Observation:
+def _observation(
+    row: tuple[Any, ...], reads: tuple[CodeRead, ...], texts: tuple[LabelValue, ...]
+) -> Observation:
     _, run, location, utc_ns, state, confidence, evidence, node, *place = row
     pose = None if node is None else CountPose(node, *place)
-    return Observation(run, location, utc_ns, LocationState(state), confidence, reads, pose, evidence)
+    seen = LocationState(state)
+    return Observation(run, location, utc_ns, seen, confidence, reads, pose, evidence, texts)

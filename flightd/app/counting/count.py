@@ -7,6 +7,7 @@ from functools import partial
 
 from flightd.app.counting.code_readers import Readers, ShelfWatch
 from flightd.app.counting.store_writer import StoreWriter
+from flightd.app.counting.text_searcher import TextSearcher
 from flightd.app.flight import Tasks
 from flightd.core.scanning import CodeSet, Finding, Place
 from flightd.core.tick import TickOutput
@@ -15,7 +16,8 @@ from flightd.runtime.frame_ring import FrameTicket
 
 
 class Counting:
-    """`app.flight.Count`: readers of the front camera's frames and, if the inventory is kept, its writer.
+    """`app.flight.Count`: readers of the front camera's frames and, if the inventory is kept, its writer and
+    what reads printed text in its pictures.
 
     `counted` are locations that an earlier flight of this count has booked.  Nothing is read before
     `read_for` says what frames are wanted for."""
@@ -26,10 +28,12 @@ class Counting:
         workers: int,
         writer: StoreWriter | None = None,
         counted: frozenset[str] = frozenset(),
+        texts: TextSearcher | None = None,
     ) -> None:
         self._watch = ShelfWatch(readers, _nothing)
         self._workers = workers
         self._writer = writer
+        self._texts = texts
         self._counted: tuple[str, ...] = tuple(sorted(counted))
         self._findings: dict[str, Finding] = {}
         self._confirmed: set[str] = set()
@@ -47,7 +51,11 @@ class Counting:
         tasks: dict[str, Callable[[], Awaitable[None]]] = {
             f"read-{i}": self._watch.run for i in range(self._workers)
         }
-        return tasks if self._writer is None else tasks | {"store": partial(self._writer.run, on_trouble)}
+        if self._writer is not None:
+            tasks["store"] = partial(self._writer.run, on_trouble)
+        if self._texts is not None:
+            tasks["texts"] = self._texts.run
+        return tasks
 
     def frame(self, ticket: FrameTicket) -> None:
         """A frame of the front camera."""

@@ -11,7 +11,8 @@ from pathlib import Path
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.counting.code_readers import ReaderPool, Readers
 from flightd.app.counting.count import Counting
-from flightd.app.counting.store_writer import StoreWriter
+from flightd.app.counting.store_writer import StoreWriter, nobody
+from flightd.app.counting.text_searcher import TextSearcher, needs_extra
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import PlannedLocation
@@ -81,13 +82,32 @@ class FlightCount:
         scan = self._scan
         pool = self._stack.enter_context(ReaderPool(scan.workers, scan.timeout_s, clock, hold))
         await pool.ready()
-        writer = None
+        writer, texts = None, None
         if self._store is not None:
+            texts = self._text_searcher(self._store, hold)
             utc_at_zero_ns = time.time_ns() - clock.now_ns()
             writer = self._stack.enter_context(
-                StoreWriter(self._store, self._run, utc_at_zero_ns, clock, _to_stderr, hold)
+                StoreWriter(
+                    self._store,
+                    self._run,
+                    utc_at_zero_ns,
+                    clock,
+                    _to_stderr,
+                    hold,
+                    texts.put if texts else nobody,
+                )
             )
-        return Counting(timed(pool), scan.workers, writer, self._counted)
+        return Counting(timed(pool), scan.workers, writer, self._counted, texts)
+
+    def _text_searcher(self, store: SqliteStore, hold: Hold) -> TextSearcher | None:
+        """What reads printed text, where the site says what text means; told once where it cannot be read."""
+        if not self._scan.text:
+            return None
+        missing = needs_extra()
+        if missing is not None:
+            _to_stderr(str(missing))
+            return None
+        return self._stack.enter_context(TextSearcher(store, self._scan.text, _to_stderr, hold))
 
 
 def _to_stderr(text: str) -> None:

@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from typing import Self
 
 from flightd.core.errors import UnavailableError
-from flightd.core.inventory import CountPose, Observation
+from flightd.core.inventory import CountPose, LocationState, Observation
 from flightd.core.scanning import Finding, Settled
 from flightd.ports import Clock, Store
 from flightd.runtime.clock import Hold
@@ -19,6 +19,14 @@ _MOST_WAITING = 20_000
 _MOST_PICTURES = 400
 _TELL_NS = 10_000_000_000
 _FIRST_WAIT_S, _LONGEST_WAIT_S = 0.2, 5.0
+
+
+def _is_empty(finding: Finding) -> bool:
+    return finding.state is LocationState.EMPTY
+
+
+def nobody(_observation: str, _jpeg: bytes) -> None:
+    """Nobody wants to know."""
 
 
 class StoreWriter:
@@ -39,8 +47,11 @@ class StoreWriter:
         clock: Clock,
         on_trouble: Callable[[str], None],
         hold: Hold = nullcontext,
+        on_written: Callable[[str, bytes], None] = nobody,
     ) -> None:
+        """`on_written` is told id and picture of what `run` has put on the disk, empty places aside."""
         self._store = store
+        self._on_written = on_written
         self._run = run
         self._utc_at_zero_ns = utc_at_zero_ns
         self._clock = clock
@@ -92,8 +103,9 @@ class StoreWriter:
         while True:
             while self._queue:
                 try:
+                    entry = self._queue[0]
                     with self._hold():
-                        await loop.run_in_executor(self._thread, self._write, self._queue[0])
+                        written = await loop.run_in_executor(self._thread, self._write, entry)
                 except UnavailableError as err:
                     self._tell(f"inventory: {err}; {len(self._queue)} findings wait")
                     await asyncio.sleep(wait_s)
@@ -101,6 +113,8 @@ class StoreWriter:
                     continue
                 wait_s = _FIRST_WAIT_S
                 self._forget()
+                if written and isinstance(entry, tuple) and entry[1] and not _is_empty(entry[0]):
+                    self._on_written(written, entry[1])
             self._arrived.clear()
             await self._arrived.wait()
 
@@ -119,13 +133,16 @@ class StoreWriter:
         self._pictures -= isinstance(entry, tuple) and bool(entry[1])
         self.written += 1
 
-    def _write(self, entry: tuple[Finding, bytes] | Settled) -> None:
+    def _write(self, entry: tuple[Finding, bytes] | Settled) -> str:
+        """The id of the observation that was written, if one was."""
         if isinstance(entry, Settled):
             self._store.settle(self._run, entry.locations, entry.confirmed)
-            return
+            return ""
         finding, jpeg = entry
         evidence = self._store.keep_evidence(jpeg) if jpeg else ""
-        self._store.commit(self._observation(finding, evidence), confirmed=False)
+        observation = self._observation(finding, evidence)
+        self._store.commit(observation, confirmed=False)
+        return observation.id
 
     def _observation(self, f: Finding, evidence: str) -> Observation:
         pose = CountPose(f.node, f.x_m, f.y_m, f.height_m, f.yaw_rad)

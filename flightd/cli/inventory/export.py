@@ -10,8 +10,9 @@ from typing import Annotated
 
 import typer
 
-from flightd.cli.inventory.records import Folder
+from flightd.cli.inventory.records import Folder, LeastConfidence
 from flightd.core.errors import InputError, cannot_write
+from flightd.core.label_values import LEAST_CONFIDENCE
 
 
 def register(app: typer.Typer) -> None:
@@ -29,6 +30,7 @@ def export(
     gln: Annotated[
         str, typer.Option(metavar="GLN", help="EPCIS: the site's GLN; locations become its places (254).")
     ] = "",
+    least_confidence: LeastConfidence = LEAST_CONFIDENCE,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print what was written as one JSON document.")
     ] = False,
@@ -43,10 +45,10 @@ def export(
     """
     from flightd.adapters.store.for_reading import opened_for_reading
     from flightd.inventory.export.epcis import as_epcis
-    from flightd.inventory.export.formats import FORMATS, STDOUT, chosen_format
+    from flightd.inventory.export.formats import FORMATS, STDOUT, Writer, chosen_format
 
     chosen = chosen_format(kind, out)
-    write = chosen.write
+    write: Writer = chosen.write
     if gln:
         if chosen is not FORMATS["epcis"]:
             raise InputError("only EPCIS has it", key="--gln", remedy="add --format epcis")
@@ -54,7 +56,7 @@ def export(
     if as_json and out == STDOUT:
         raise InputError("says what was written to a file", key="--json", remedy="add --out F")
     with opened_for_reading(folder) as store:
-        data = write(store.locations())
+        data = write(store.locations(), least_confidence=least_confidence)
     if out == STDOUT:
         sys.stdout.buffer.write(data)
         return

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from flightd.core.inventory import LocationRecord
 
 Folder: TypeAlias = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of the inventory.")]
+LeastConfidence: TypeAlias = Annotated[
+    float, typer.Option(min=0, max=1, help="Values that are less sure (0..1) are unknown.")
+]
 
 
 def print_records(records: Sequence[LocationRecord]) -> None:

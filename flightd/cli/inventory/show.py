@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightd.cli.inventory.records import Folder, print_records, states_line
+from flightd.cli.inventory.records import Folder, LeastConfidence, print_records, states_line
 from flightd.cli.options import AsJson
 from flightd.core.errors import InputError
+from flightd.core.label_values import LEAST_CONFIDENCE
 from flightd.core.terminal_text import visible
 
 if TYPE_CHECKING:
@@ -28,9 +29,12 @@ def show(
     location: Annotated[
         str | None, typer.Option(metavar="CODE", help="Every look at this one location.")
     ] = None,
+    least_confidence: LeastConfidence = LEAST_CONFIDENCE,
     as_json: AsJson = False,
 ) -> None:
     """Show the state of every location, or the history of one.
+
+    With --json each has the values that its labels tell besides: lot, dates, quantity, weights.
 
     \b
     Examples:
@@ -42,31 +46,35 @@ def show(
     with opened_for_reading(folder) as store:
         records = store.locations()
         if location is None:
-            _show_records(records, as_json)
+            _show_records(records, as_json, least_confidence)
             return
         if all(record.code != location for record in records):
             raise InputError(f"knows no location {location!r}", file=folder)
-        _show_history(location, store.history(location), as_json)
+        _show_history(location, store.history(location), as_json, least_confidence)
 
 
-def _show_records(records: Sequence[LocationRecord], as_json: bool) -> None:
+def _show_records(records: Sequence[LocationRecord], as_json: bool, least_confidence: float) -> None:
     from flightd.inventory.export.json_document import location_json
 
     if as_json:
         states = Counter(record.state.value for record in records)
-        document = {"states": dict(states), "locations": [location_json(record) for record in records]}
+        told = [location_json(record, least_confidence) for record in records]
+        document = {"states": dict(states), "locations": told}
         print(json.dumps(document, indent=1, ensure_ascii=False))
         return
     print_records(records)
     print(states_line(records))
 
 
-def _show_history(location: str, looks: Sequence[Observation], as_json: bool) -> None:
+def _show_history(
+    location: str, looks: Sequence[Observation], as_json: bool, least_confidence: float
+) -> None:
     from flightd.core.utc_time import utc_text
     from flightd.inventory.export.json_document import observation_json
 
     if as_json:
-        document = {"location": location, "observations": [observation_json(seen) for seen in looks]}
+        told = [observation_json(seen, least_confidence) for seen in looks]
+        document = {"location": location, "observations": told}
         print(json.dumps(document, indent=1, ensure_ascii=False))
         return
     for seen in looks:

@@ -10,21 +10,29 @@ from urllib.parse import quote
 
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, Observation
+from flightd.core.label_values import LEAST_CONFIDENCE
 from flightd.core.utc_time import utc_text
 from flightd.inventory.export.gs1_uri import (
-    elements_of,
     item_uri,
     location_code_uri,
     location_uri,
     place_in,
 )
+from flightd.inventory.export.value_reports import value_reports
+from flightd.vision.shelf.digital_link import elements_of
 from flightd.vision.shelf.gs1 import Gs1Error
 
 BASE_URI = "urn:x-flightd:"
 """Before what has no URI of GS1."""
 
 
-def as_epcis(records: Sequence[LocationRecord], gln: str = "", base_uri: str = BASE_URI) -> bytes:
+def as_epcis(
+    records: Sequence[LocationRecord],
+    gln: str = "",
+    base_uri: str = BASE_URI,
+    *,
+    least_confidence: float = LEAST_CONFIDENCE,
+) -> bytes:
     """EPCIS 2.0 JSON-LD: one ObjectEvent (OBSERVE, cycle_counting) for each location that was looked at.
 
     GS1 keys become canonical GS1 Digital Link URIs: SSCC, serialised GTIN, GRAI and the like as instances,
@@ -34,11 +42,13 @@ def as_epcis(records: Sequence[LocationRecord], gln: str = "", base_uri: str = B
 
     An event of an empty, unreadable or occluded location has no object: it tells the state as a sensor
     report of the read point (`location_state`), which is the standard's event of a place alone.  One that
-    nobody looked at has none.  The creation date is that of the newest look: the same inventory gives the
-    same document.  InputError for a `gln` that is none, or a location code that cannot extend it.
+    nobody looked at has none.  What is known of the goods besides is told by sensor reports, too
+    (`value_reports`): the standard has ILMD only in events that add an object.  The creation date is that of
+    the newest look: the same inventory gives the same document.  InputError for a `gln` that is none, or a
+    location code that cannot extend it.
     """
     looked = [(record, record.observation) for record in records if record.observation]
-    events = [_event(record, seen, gln, base_uri) for record, seen in looked]
+    events = [_event(record, seen, gln, base_uri, least_confidence) for record, seen in looked]
     newest = max((seen.utc_ns for _, seen in looked), default=0)
     document = {
         "@context": ["https://ref.gs1.org/standards/epcis/2.0.0/epcis-context.jsonld"],
@@ -50,19 +60,21 @@ def as_epcis(records: Sequence[LocationRecord], gln: str = "", base_uri: str = B
     return (json.dumps(document, indent=1) + "\n").encode()
 
 
-def _event(record: LocationRecord, seen: Observation, gln: str, base_uri: str) -> dict[str, Any]:
+def _event(
+    record: LocationRecord, seen: Observation, gln: str, base_uri: str, least_confidence: float
+) -> dict[str, Any]:
     instances: set[str] = set()
     classes: set[str] = set()
     labels: set[str] = set()
+    things: dict[str, str] = {}
     for read in seen.reads:
         item = item_uri(read)
-        if item is not None:
-            uri, is_class = item
-            (classes if is_class else instances).add(uri)
-        elif (own := location_uri(elements_of(read))) is not None:
+        if item is None and (own := location_uri(elements_of(read))) is not None:
             labels.add(own)
-        else:
-            instances.add(f"{base_uri}code:{quote(read.text, safe='-._~')}")
+            continue
+        uri, is_class = item or (f"{base_uri}code:{quote(read.text, safe='-._~')}", False)
+        (classes if is_class else instances).add(uri)
+        things[read.text] = uri
     place = {"id": _place(record.code, labels, gln, base_uri)}
     event: dict[str, Any] = {
         "type": "ObjectEvent",
@@ -78,9 +90,11 @@ def _event(record: LocationRecord, seen: Observation, gln: str, base_uri: str) -
         event["epcList"] = sorted(instances)
     if classes:
         event["quantityList"] = [{"epcClass": uri} for uri in sorted(classes)]
+    reports = value_reports(seen, things, base_uri, least_confidence)
     if not instances and not classes:
-        report = {"type": f"{base_uri}location_state", "stringValue": seen.state.value}
-        event["sensorElementList"] = [{"sensorReport": [report]}]
+        reports.insert(0, {"type": f"{base_uri}location_state", "stringValue": seen.state.value})
+    if reports:
+        event["sensorElementList"] = [{"sensorReport": reports}]
     return event
 
 

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord
+from flightd.core.label_values import LEAST_CONFIDENCE
 from flightd.inventory.export.csv_table import as_csv
 from flightd.inventory.export.epcis import as_epcis
 from flightd.inventory.export.json_document import as_json
 from flightd.inventory.export.xlsx import as_xlsx
 
 
+class Writer(Protocol):
+    """Makes a file of an inventory; values are known from `least_confidence` on."""
+
+    def __call__(
+        self, records: Sequence[LocationRecord], *, least_confidence: float = LEAST_CONFIDENCE
+    ) -> bytes: ...
+
+
 class ExportFormat(NamedTuple):
     """The ending of its files, and what makes the bytes of one."""
 
     suffix: str
-    write: Callable[[Sequence[LocationRecord]], bytes]
+    write: Writer
 
 
 FORMATS: Final = {

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from flightd.core.types import CodeRead
-from flightd.vision.shelf.digital_link import digital_link, parse_digital_link
+from flightd.vision.shelf.digital_link import digital_link, elements_of, link_elements
 from flightd.vision.shelf.gs1 import Elements, Gs1Error, check_element, parse_element_string
 
 _GTIN: Final = {"EAN-13": 13, "EAN-8": 8, "UPC-A": 12, "UPC-E": 12, "ITF-14": 14}
@@ -19,11 +19,6 @@ _SERIAL_BEHIND: Final = {"8003": 14, "253": 13, "255": 13}
 """Keys with a serial number behind so many digits; without it they are a class."""
 _THINGS: Final = ("00", "8004", "8018", "8017", "402", "401")
 _BRACKETED: Final = re.compile(r"\((\d{2,4})\)([^(]+)")
-
-
-def elements_of(read: CodeRead) -> Elements:
-    """The GS1 elements of a read; those of a Digital Link that was counted as a plain text, too."""
-    return read.gs1 or _link_elements(read.text)
 
 
 def item_uri(read: CodeRead) -> tuple[str, bool] | None:
@@ -66,7 +61,7 @@ def location_code_uri(code: str) -> str | None:
     try:
         elements = parse_element_string(code)
     except Gs1Error:
-        elements = _link_elements(code)
+        elements = link_elements(code)
     return location_uri(elements)
 
 
@@ -82,13 +77,6 @@ def _with(key: str, qualifiers: tuple[str, ...], elements: Mapping[str, str]) ->
     """The URI with the first of the qualifiers that there is."""
     found = next((ai for ai in qualifiers if ai in elements), None)
     return digital_link((key, elements[key]), (found, elements[found])) if found else None
-
-
-def _link_elements(text: str) -> Elements:
-    try:
-        return parse_digital_link(text)
-    except Gs1Error:
-        return ()
 
 
 def _all_hold(elements: Elements) -> bool:

@@ -6,23 +6,26 @@ import json
 from collections.abc import Sequence
 
 from flightd.core.inventory import LocationRecord, Observation
+from flightd.core.label_values import LEAST_CONFIDENCE, PlaceValue, told_number, told_text
 from flightd.core.utc_time import utc_text
+from flightd.inventory.place_values import code_values, place_values
 
 
-def location_json(record: LocationRecord) -> dict[str, object]:
-    """One location with all that is known of it."""
+def location_json(record: LocationRecord, least_confidence: float = LEAST_CONFIDENCE) -> dict[str, object]:
+    """One location with all that is known of it; values that are less sure than demanded are unknown."""
     seen = record.observation
     return {
         "location": record.code,
         "state": record.state.value,
         "node": record.node,
         "texts": list(record.texts),
-        "observation": observation_json(seen) if seen else None,
+        "values": [_value_json(value) for value in place_values(seen, least_confidence)],
+        "observation": observation_json(seen, least_confidence) if seen else None,
     }
 
 
-def observation_json(seen: Observation) -> dict[str, object]:
-    """One look at a location."""
+def observation_json(seen: Observation, least_confidence: float = LEAST_CONFIDENCE) -> dict[str, object]:
+    """One look at a location, each code with its own values."""
     pose = seen.pose
     return {
         "utc": utc_text(seen.utc_ns),
@@ -46,13 +49,29 @@ def observation_json(seen: Observation) -> dict[str, object]:
                 "agreeing": read.agreeing,
                 "quality": read.quality,
                 "gs1": dict(read.gs1),
+                "values": [_value_json(value) for value in code_values(read, seen, least_confidence)],
             }
             for read in seen.reads
         ],
     }
 
 
-def as_json(records: Sequence[LocationRecord]) -> bytes:
+def _value_json(stands: PlaceValue) -> dict[str, object]:
+    """A value with its unit and source; of one that is unknown, the reason."""
+    told = stands.known
+    if told is None:
+        return {"kind": stands.kind.value, "value": None, "unknown": stands.unknown}
+    number = told_number(told.value)
+    return {
+        "kind": stands.kind.value,
+        "value": told_text(told.value) if number is None else number,
+        "unit": told.unit,
+        "source": told.source.value,
+        "confidence": told.confidence,
+    }
+
+
+def as_json(records: Sequence[LocationRecord], least_confidence: float = LEAST_CONFIDENCE) -> bytes:
     """Every location with its newest look."""
-    document = {"locations": [location_json(record) for record in records]}
+    document = {"locations": [location_json(record, least_confidence) for record in records]}
     return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()

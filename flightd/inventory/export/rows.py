@@ -6,17 +6,24 @@ from collections.abc import Sequence
 from typing import Final
 
 from flightd.core.inventory import LocationRecord
+from flightd.core.label_values import LEAST_CONFIDENCE
 from flightd.core.types import CodeRead
 from flightd.core.utc_time import utc_text
+from flightd.inventory.export.value_columns import VALUE_COLUMNS, value_cells
+from flightd.inventory.place_values import code_values, place_values
 
 COLUMNS: Final = (
     "location", "state", "text", "symbology", "gs1", "confidence", "utc", "run", "node", "x_m", "y_m",
-    "height_m", "evidence",
+    "height_m", "evidence", *VALUE_COLUMNS,
 )  # fmt: skip
 
 
-def rows_of(records: Sequence[LocationRecord]) -> list[list[str | float]]:
-    """One row for each code at a location, one without code for the others."""
+def rows_of(
+    records: Sequence[LocationRecord], least_confidence: float = LEAST_CONFIDENCE
+) -> list[list[str | float]]:
+    """One row for each code at a location, one without code for the others.
+
+    Where there are several codes each has its own values, else what is known of the place."""
     rows: list[list[str | float]] = []
     for record in records:
         seen = record.observation
@@ -24,6 +31,10 @@ def rows_of(records: Sequence[LocationRecord]) -> list[list[str | float]]:
         pose = seen.pose if seen else None
         told = {read.text if read else "": read for read in reads}
         for text, read in told.items():
+            if seen and read and len(told) > 1:
+                values = code_values(read, seen, least_confidence)
+            else:
+                values = place_values(seen, least_confidence)
             gs1 = "".join(f"({ai}){value}" for ai, value in read.gs1) if read else ""
             rows.append(
                 [
@@ -31,6 +42,7 @@ def rows_of(records: Sequence[LocationRecord]) -> list[list[str | float]]:
                     seen.confidence if seen else "", utc_text(seen.utc_ns) if seen else "",
                     seen.run if seen else "", record.node, pose.x_m if pose else "",
                     pose.y_m if pose else "", pose.height_m if pose else "", seen.evidence if seen else "",
+                    *value_cells(values),
                 ]
             )  # fmt: skip
     return rows

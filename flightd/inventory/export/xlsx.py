@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from flightd.core.csv_text import inert
 from flightd.core.extras import missing_extra
 from flightd.core.inventory import LocationRecord
+from flightd.core.label_values import LEAST_CONFIDENCE
 from flightd.inventory.export.rows import COLUMNS, rows_of
 
 
-def as_xlsx(records: Sequence[LocationRecord]) -> bytes:
+def as_xlsx(records: Sequence[LocationRecord], least_confidence: float = LEAST_CONFIDENCE) -> bytes:
     """One sheet with a filter; what labels say is exact text, never a formula, nor when the cell is edited.
     Needs the extra `xlsx`."""
     try:
@@ -21,7 +22,7 @@ def as_xlsx(records: Sequence[LocationRecord]) -> bytes:
     out = io.BytesIO()
     book = xlsxwriter.Workbook(out, {"in_memory": True})
     sheet = book.add_worksheet("inventory")
-    rows = rows_of(records)
+    rows = rows_of(records, least_confidence)
     bold = book.add_format({"bold": True})
     text = book.add_format({"num_format": "@", "quote_prefix": True})
     for column, name in enumerate(COLUMNS):

@@ -13,6 +13,8 @@ import numpy as np
 from flightd.core.inventory import LocationRecord, LocationState
 from flightd.inventory.comparison import ComparisonOutcome
 from flightd.inventory.export.rows import COLUMNS, rows_of
+from flightd.inventory.export.value_columns import value_text
+from flightd.inventory.place_values import place_values
 from flightd.replay.report.markup import NOTHING, element, table, text
 from flightd.replay.report.racks import STATE_NAMES, racks_section
 from flightd.replay.report.stock import SETTLED, CountedStock, share
@@ -184,6 +186,7 @@ def _look(record: LocationRecord, outcome: str) -> dict[str, object]:
         for label, value in (
             ("Codes", ", ".join(record.texts)),
             ("Symbology", ", ".join(dict.fromkeys(read.symbology for read in seen.reads)) if seen else ""),
+            ("Values", ", ".join(value_text(value).replace("_", " ") for value in place_values(seen))),
             ("Confidence", share(seen.confidence) if seen else ""),
             ("Looked at", f"{_when(seen.utc_ns)} UTC" if seen else ""),
             ("From node", (seen.pose.node if seen and seen.pose else record.node)),

@@ -21,6 +21,7 @@ import zxingcpp
 from flightd.core.geometry import Matrix
 from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf.blurred_ean import read_blurred_ean
+from flightd.vision.shelf.code_modules import module_px, qr_version
 from flightd.vision.shelf.code_regions import CodeRegion, code_regions
 from flightd.vision.shelf.crease_flattening import flatten_qr
 from flightd.vision.shelf.digital_link import parse_digital_link
@@ -123,6 +124,7 @@ class _Candidate:
     looks: set[int] = field(default_factory=set)
     first_look: int = 0
     unaltered: bool = False
+    module_px: float | None = None
 
     @property
     def sure(self) -> bool:
@@ -228,7 +230,7 @@ def _flatten_damaged(
 ) -> bool:
     """Read one of the QR codes that were found and not read, flattened; says whether one was."""
     for view, picture_from_view, code in damaged[:_MOST_DAMAGED]:
-        mended = flatten_qr(view, _corners(code), _version(code))
+        mended = flatten_qr(view, _corners(code), qr_version(code))
         if mended is not None:
             placed = _transformed(_corners(code), picture_from_view)
             _add(
@@ -252,13 +254,7 @@ def _read_blurred(crop: Image, region: CodeRegion, found: list[_Candidate]) -> N
 
 
 def _is_damaged_qr(code: zxingcpp.Barcode) -> bool:
-    return not code.valid and str(code.format) == "QR Code" and _version(code) > 0
-
-
-def _version(code: zxingcpp.Barcode) -> int:
-    """The QR code's version, 0 where the reader does not tell."""
-    version = str(code.extra.get("Version")) if isinstance(code.extra, dict) else ""
-    return int(version) if version.isdecimal() else 0
+    return not code.valid and str(code.format) == "QR Code" and qr_version(code) > 0
 
 
 def _view(crop: Image, look: _Look) -> tuple[Image, Matrix]:
@@ -293,7 +289,19 @@ def _collect(
         symbology, text = _named(code)
         corners = _transformed(_corners(code), picture_from_view)
         is_gs1 = code.content_type == zxingcpp.ContentType.GS1
-        _add(found, _Candidate(symbology, text, _proof(code), is_gs1, corners, first_look=look), look)
+        _add(
+            found,
+            _Candidate(
+                symbology,
+                text,
+                _proof(code),
+                is_gs1,
+                corners,
+                first_look=look,
+                module_px=module_px(code, corners),
+            ),
+            look,
+        )
 
 
 def _add(found: list[_Candidate], new: _Candidate, look: int) -> None:
@@ -375,4 +383,5 @@ def _code_read(candidate: _Candidate, width: int, height: int) -> CodeRead:
         quality=round(1.0 - candidate.first_look / (_BLURRED + 1), 3),
         gs1=elements,
         gs1_problem=problem,
+        module_px=candidate.module_px,
     )

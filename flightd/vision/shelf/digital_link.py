@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final
 from urllib.parse import parse_qsl, quote, unquote, urlsplit
 
+from flightd.core.types import CodeRead
 from flightd.vision.shelf.gs1 import Elements, Gs1Error, check_element
 
 _QUALIFIERS: Final = {
@@ -63,6 +64,19 @@ def parse_digital_link(text: str) -> Elements:
             check_element(identifier, told)
         return elements
     return ()
+
+
+def elements_of(read: CodeRead) -> Elements:
+    """The GS1 elements of a read; those of a Digital Link that was counted as a plain text, too."""
+    return read.gs1 or link_elements(read.text)
+
+
+def link_elements(text: str) -> Elements:
+    """The elements of a Digital Link; none of a text that is none, or of one that is damaged."""
+    try:
+        return parse_digital_link(text)
+    except Gs1Error:
+        return ()
 
 
 def digital_link(*elements: tuple[str, str]) -> str:

@@ -212,6 +212,75 @@ def test_epcis_tells_of_places_without_a_code_too_and_of_none_that_was_not_seen(
     assert "A-07" not in events
 
 
+@pytest.fixture
+def labelled(tmp_path: Path) -> Path:
+    """A place with one label that says much, and one with two codes of which each says its own."""
+    folder = tmp_path / "labelled"
+    with SqliteStore(folder) as store:
+        article = code("a", a01="09501101530003", a10="B1", a17="020600", a3103="001750", a37="12")
+        pallets = code("b", a00="395011010013000129", a15="011231"), code("c", a10="B2", a15="020131")
+        store.commit(look("A-01", 1, article))
+        store.commit(look("A-02", 2, *pallets))
+    return folder
+
+
+def test_lot_dates_and_measures_are_columns_of_their_own(labelled: Path, tmp_path: Path) -> None:
+    rows = list(csv.DictReader(io.StringIO(run("export", labelled))))
+    names = ("lot", "best_before", "expiry", "quantity", "net_weight")
+    assert [[row[name] for name in names] for row in rows] == [
+        ["B1", "", "2002-06-30", "12", "1.75"],
+        ["", "2001-12-31", "", "", ""],
+        ["B2", "2002-01-31", "", "", ""],
+    ]
+    assert rows[0]["net_weight_unit"] == "kg"
+    surer = csv.DictReader(io.StringIO(run("export", labelled, "--least-confidence", "0.95")))
+    assert [row["lot"] for row in surer] == ["unknown", "", "unknown"]
+    out = tmp_path / "stock.xlsx"
+    run("export", labelled, "--out", out)
+    with zipfile.ZipFile(out) as book:
+        assert "<t>best_before</t>" in book.read("xl/sharedStrings.xml").decode()
+
+
+def test_values_of_codes_that_differ_are_unknown_at_their_place(labelled: Path) -> None:
+    first, second = json.loads(run("show", labelled, "--json"))["locations"]
+    assert {value["kind"]: value["value"] for value in first["values"]} == {
+        "lot": "B1", "expiry": "2002-06-30", "quantity": 12, "net_weight": 1.75,
+    }  # fmt: skip
+    assert first["values"][0] == {
+        "kind": "lot", "value": "B1", "unit": "", "source": "gs1", "confidence": 0.9,
+    }  # fmt: skip
+    assert second["values"] == [
+        {"kind": "lot", "value": "B2", "unit": "", "source": "gs1", "confidence": 0.9},
+        {"kind": "best_before", "value": None, "unknown": "several"},
+    ]
+    reads = second["observation"]["reads"]
+    assert [value["value"] for read in reads for value in read["values"]] == [
+        "2001-12-31",
+        "B2",
+        "2002-01-31",
+    ]
+
+
+def test_epcis_tells_values_of_each_object_as_sensor_reports_and_never_as_master_data(
+    labelled: Path, tmp_path: Path
+) -> None:
+    events = epcis(labelled, tmp_path / "stock.jsonld")
+    assert all("ilmd" not in event for event in events.values()), "the standard has it in ADD events alone"
+    (element,) = events["A-01"]["sensorElementList"]
+    of = {"uriValue": "https://id.gs1.org/01/09501101530003/10/B1"}  # which says the lot
+    assert element["sensorReport"] == [
+        {"type": "urn:x-flightd:expiry", "stringValue": "2002-06-30", **of},
+        {"type": "urn:x-flightd:quantity", "value": 12, **of},
+        {"type": "urn:x-flightd:net_weight", "value": 1.75, "uom": "KGM", **of},
+    ]
+    (element,) = events["A-02"]["sensorElementList"]
+    assert [(report["stringValue"], report["uriValue"]) for report in element["sensorReport"]] == [
+        ("2001-12-31", "https://id.gs1.org/00/395011010013000129"),
+        ("B2", "urn:x-flightd:code:c"),
+        ("2002-01-31", "urn:x-flightd:code:c"),
+    ]
+
+
 GLN = "9501101530003"
 
 

@@ -68,6 +68,18 @@ def test_a_log_without_its_index_is_left_to_a_writer(tmp_path: Path) -> None:
         assert "inventory.db-shm" not in files(tmp_path)
 
 
+def test_a_store_of_the_format_before_is_read_as_it_is(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as writer:
+        writer.commit(EMPTY)
+    with sqlite3.connect(tmp_path / "inventory.db") as older:
+        older.execute("ALTER TABLE code_read DROP COLUMN module_px")
+        older.execute("DROP TABLE text_search")
+        older.execute("PRAGMA user_version = 2")
+    older.close()
+    with SqliteStore(tmp_path, read_only=True) as store:
+        assert [record.observation for record in store.locations()] == [EMPTY]
+
+
 def test_what_is_no_store_of_today_is_refused_and_not_made_one(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"holds no inventory\.db"):
         SqliteStore(tmp_path / "none", read_only=True)
@@ -82,7 +94,7 @@ def test_what_is_no_store_of_today_is_refused_and_not_made_one(tmp_path: Path) -
     with sqlite3.connect(file) as changed:
         changed.execute("PRAGMA user_version = 1")
     changed.close()
-    with pytest.raises(InputError, match="format 1, known here is 2; open it once with flightd inventory"):
+    with pytest.raises(InputError, match="format 1, known here is 3; open it once with flightd inventory"):
         SqliteStore(tmp_path, read_only=True)
     with sqlite3.connect(file) as changed:
         changed.execute("PRAGMA application_id = 7")

@@ -40,7 +40,8 @@ def test_planned_locations_are_not_visited_until_somebody_looks(tmp_path: Path) 
 
 
 def test_what_was_committed_is_read_back_as_it_was(tmp_path: Path) -> None:
-    gs1 = CodeRead("Code 128", "0109501101530003", (), True, 3, 0.75, (("01", "09501101530003"),))
+    elements = (("01", "09501101530003"),)
+    gs1 = CodeRead("Code 128", "0109501101530003", (), True, 3, 0.75, elements, module_px=2.9)
     seen = replace(look(2), reads=(gs1,), evidence="ab" * 32, confidence=1)
     bare = Observation("r", "B-1", 5, LocationState.EMPTY, 0.5)
     with SqliteStore(tmp_path) as store:
@@ -223,12 +224,18 @@ def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path:
         assert [kept.id for kept in other.history(seen.location)] == [seen.id]
 
 
-def test_an_inventory_of_the_first_format_is_taken_over_as_confirmed(tmp_path: Path) -> None:
+TO_2 = ("ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
+OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2}
+
+
+@pytest.mark.parametrize("version", OLDER)
+def test_an_inventory_of_an_earlier_format_is_taken_over_as_confirmed(tmp_path: Path, version: int) -> None:
     with SqliteStore(tmp_path) as store:
         store.commit(look(1))
     database = sqlite3.connect(tmp_path / "inventory.db")
-    database.execute("ALTER TABLE observation DROP COLUMN standing")
-    database.execute("PRAGMA user_version = 1")
+    for statement in OLDER[version]:
+        database.execute(statement)
+    database.execute(f"PRAGMA user_version = {version}")
     database.close()
     with SqliteStore(tmp_path) as store:
         assert newest(store, look(1).location) == look(1).id

@@ -1,0 +1,204 @@
+"""Printed text on labels, read by the networks of rapidocr (PP-OCR), whose models come with the package.
+
+Lines are found by its detector and cut out here: its own boxes end at the last stroke, and half a letter is
+read as another one with great confidence.  Each line is read twice, with more and with less room around it.
+Needs the extra `ocr`; nothing of it is imported before the first picture.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from flightd.core.extras import missing_extra
+from flightd.core.geometry import Matrix
+from flightd.core.label_text import TextLine, TextLook
+from flightd.core.types import Image
+from flightd.vision.shelf.label_regions import label_regions
+
+_LONGEST_SIDE_PX: Final = 1280
+"""Larger regions are shrunk for finding lines, not for reading them."""
+_MOST_LINES: Final = 24
+_LINE_PX: Final = 48
+"""Height at which the network reads."""
+_ROOMS: Final = ((0.35, 0.05), (0.60, 0.15))
+"""Room (along, across) around a line as a part of its height, for each look."""
+_JOINED_GAP: Final = 1.2
+"""Pieces nearer to each other than this part of their height are one line."""
+_END: Final = 0.15
+"""Part of the height beyond each end of a line that must be plain paper."""
+_BURNT: Final = 252
+_SMOOTH_PX: Final = 1.5
+_WHITE: Final = 245
+_LOST_END_PX: Final = 10
+_LOST_PX: Final = 12
+"""So many columns in a row, at an end or within, that have nothing darker (grey levels, noise smoothed) are
+where glare may have taken characters."""
+
+
+class TextReader:
+    """Reads pictures one after the other, in one thread.  UnavailableError where the extra is missing."""
+
+    def __init__(self) -> None:
+        try:
+            from rapidocr import RapidOCR  # noqa: PLC0415 - an extra, and slow to import
+        except ImportError:
+            raise missing_extra("ocr", "reading text") from None
+        one_thread = {f"EngineConfig.onnxruntime.{pool}_op_num_threads": 1 for pool in ("intra", "inter")}
+        sizes = {"Det.limit_type": "max", "Det.limit_side_len": _LONGEST_SIDE_PX}
+        self._engine: Any = RapidOCR(
+            params={**one_thread, **sizes, "Global.log_level": "critical", "Global.text_score": 0.0}
+        )
+
+    def read(self, bgr: Image) -> tuple[TextLine, ...]:
+        """The lines on everything in a picture, (H, W, 3) BGR, that looks like a label; of all of it where
+        nothing does."""
+        height, width = bgr.shape[:2]
+        regions = label_regions(bgr) or [(0, 0, width, height)]
+        found: list[TextLine] = []
+        for x0, y0, x1, y1 in regions:
+            region = np.ascontiguousarray(bgr[y0:y1, x0:x1])
+            centre = (width - 1) / 2 - x0, (height - 1) / 2 - y0
+            strips = self._strips(region)[: _MOST_LINES - len(found)]
+            found += [self._line(region, strip, centre) for strip in strips]
+        return tuple(line for line in found if any(look.text for look in line.looks))
+
+    def _strips(self, region: Image) -> list[_Strip]:
+        boxes = self._engine(region, use_det=True, use_cls=False, use_rec=False).boxes
+        strips = [] if boxes is None else [_Strip.of(np.asarray(box, np.float64)) for box in boxes]
+        return _joined(sorted(strips, key=lambda strip: (strip.middle[1], strip.middle[0])))
+
+    def _line(self, region: Image, strip: _Strip, centre: tuple[float, float]) -> TextLine:
+        looks = tuple(self._look(strip.cut_out(region, *room)) for room in _ROOMS)
+        doubts = strip.doubts(region)
+        corners = tuple((round(x - centre[0], 1), round(y - centre[1], 1)) for x, y in strip.corners())
+        return TextLine(corners, looks, doubts.left, doubts.right, doubts.gap, round(doubts.glare, 3))
+
+    def _look(self, line: Image) -> TextLook:
+        out = self._engine(line, use_det=False, use_cls=False, use_rec=True, return_word_box=True)
+        if out is None or not out.txts or not out.word_results:
+            return TextLook("", ())
+        text, sure = out.txts[0], out.word_results[0].confs
+        if len(text) != len(sure):  # what cannot be told apart is sure to nobody
+            return TextLook(text, (0.0,) * len(text))
+        return TextLook(text, tuple(map(float, sure)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Doubts:
+    """As `TextLine` has them."""
+
+    left: bool
+    right: bool
+    gap: bool
+    glare: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Strip:
+    """A line in pixels of its region: middle, direction (a unit vector to the right), length, height."""
+
+    middle: Matrix
+    along: Matrix
+    length: float
+    height: float
+
+    @classmethod
+    def of(cls, box: Matrix) -> _Strip:
+        """Of a box's corners (left top, clockwise)."""
+        along = (box[1] - box[0] + box[2] - box[3]) / 2
+        down = (box[3] - box[0] + box[2] - box[1]) / 2
+        length, height = float(np.linalg.norm(along)), float(np.linalg.norm(down))
+        return cls(box.mean(axis=0), along / max(length, 1e-6), length, max(height, 1.0))
+
+    @property
+    def down(self) -> Matrix:
+        return np.array([-self.along[1], self.along[0]])
+
+    def corners(self, along_room: float = 0.0, across_room: float = 0.0) -> Matrix:
+        """(4, 2), with room as parts of the height."""
+        a = self.along * (self.length / 2 + along_room * self.height)
+        d = self.down * (self.height / 2 + across_room * self.height)
+        return np.array([self.middle - a - d, self.middle + a - d, self.middle + a + d, self.middle - a + d])
+
+    def cut_out(self, region: Image, along_room: float, across_room: float) -> Image:
+        """The strip upright, as high as the network reads."""
+        corners = self.corners(along_room, across_room)
+        scale = _LINE_PX / (self.height * (1 + 2 * across_room))
+        width = max(8, round((self.length + 2 * along_room * self.height) * scale))
+        onto = np.array([[0, 0], [width, 0], [0, _LINE_PX]], np.float32)
+        flags = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC
+        turn = cv2.getAffineTransform(corners[[0, 1, 3]].astype(np.float32), onto)
+        strip = cv2.warpAffine(region, turn, (width, _LINE_PX), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(strip, np.uint8)
+
+    def doubts(self, region: Image) -> _Doubts:
+        """What may be wrong with the line, whatever is read in it."""
+        room = _END + 0.05
+        grey = cv2.cvtColor(self.cut_out(region, room, 0.0), cv2.COLOR_BGR2GRAY)
+        wide = max(2, round(_END * _LINE_PX))
+        paper, ink = np.percentile(grey, (80, 5))
+        outside = self.corners(room)
+        size = np.array((region.shape[1], region.shape[0]))
+        inside: NDArray[np.bool_] = np.all((outside >= 0) & (outside < size), axis=1)
+        smooth = np.asarray(cv2.GaussianBlur(grey, (0, 0), _SMOOTH_PX), np.uint8)
+        lightest = smooth.min(axis=0)
+        ends = []
+        for end, corners in ((slice(wide), inside[[0, 3]]), (slice(-wide, None), inside[[1, 2]])):
+            dark = float(np.percentile(grey[:, end], 5)) < paper - 0.5 * (paper - ink)
+            columns = lightest[:_LOST_END_PX] if end.start is None else lightest[-_LOST_END_PX:]
+            ends.append(bool(dark or not corners.all() or columns.min() >= _WHITE))
+        within = lightest[_LOST_END_PX:-_LOST_END_PX] >= _WHITE
+        glare = float((grey >= _BURNT).mean())
+        return _Doubts(ends[0], ends[1], _longest_run(within) >= _LOST_PX, glare)
+
+    def with_piece(self, other: _Strip) -> _Strip:
+        """Both as one line, this one left of the other."""
+        (x0, y0), (x1, y1) = self.corners()[0], other.corners()[1]
+        along = other.middle - self.middle
+        length = math.hypot(x1 - x0, y1 - y0)
+        height = max(self.height, other.height)
+        middle = (self.corners()[[0, 3]].mean(axis=0) + other.corners()[[1, 2]].mean(axis=0)) / 2
+        return _Strip(middle, along / max(float(np.linalg.norm(along)), 1e-6), length, height)
+
+    def continues(self, other: _Strip) -> bool:
+        """Whether the other one lies on this line, directly to its right."""
+        height = min(self.height, other.height)
+        if max(self.height, other.height) > 1.6 * height:
+            return False
+        way = other.corners()[[0, 3]].mean(axis=0) - self.corners()[[1, 2]].mean(axis=0)
+        gap, off = float(way @ self.along), float(way @ self.down)
+        return -height < gap < _JOINED_GAP * height and abs(off) < 0.4 * height
+
+
+def _longest_run(flags: NDArray[np.bool_]) -> int:
+    """How many in a row are set, at most."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def _joined(strips: Sequence[_Strip]) -> list[_Strip]:
+    """Lines whose pieces were found apart, whole."""
+    left = list(strips)
+    joined: list[_Strip] = []
+    while left:
+        whole = left.pop(0)
+        while True:
+            after = next((other for other in left if whole.continues(other)), None)
+            before = next((other for other in left if other.continues(whole)), None)
+            if after is not None:
+                left.remove(after)
+                whole = whole.with_piece(after)
+            elif before is not None:
+                left.remove(before)
+                whole = before.with_piece(whole)
+            else:
+                break
+        joined.append(whole)
+    return joined

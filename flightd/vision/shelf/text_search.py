@@ -1,0 +1,48 @@
+"""The search for printed values in the kept picture of a look, as it is done in flight and after it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from flightd.config.label_text import LabelTextConfig
+from flightd.core.label_values import LabelValue
+from flightd.vision.shelf.evidence_jpeg import MOST_PIXELS, jpeg_size
+from flightd.vision.shelf.text_reader import TextReader
+from flightd.vision.shelf.text_values import text_values
+
+_METHOD = 1
+"""Another one finds other values: what was searched is searched again then."""
+
+
+def search_name(patterns: Sequence[LabelTextConfig]) -> str:
+    """The same for the same search, another one for other patterns."""
+    asked = json.dumps([_METHOD, [pattern.model_dump() for pattern in patterns]], separators=(",", ":"))
+    return hashlib.sha256(asked.encode()).hexdigest()[:16]
+
+
+class BrokenPictureError(ValueError):
+    """There is nothing to search: it is no JPEG, or a damaged one."""
+
+
+class TextSearch:
+    """Called with a picture (JPEG) it gives the values that the patterns find in it.  UnavailableError where
+    the extra `ocr` is missing."""
+
+    def __init__(self, patterns: Sequence[LabelTextConfig]) -> None:
+        self._patterns = tuple(patterns)
+        self._reader = TextReader()
+
+    def __call__(self, jpeg: bytes) -> tuple[LabelValue, ...]:
+        """BrokenPictureError for what is no picture."""
+        size = jpeg_size(jpeg)
+        if size is None or size[0] * size[1] > MOST_PIXELS:
+            raise BrokenPictureError("no picture that can be read")
+        bgr = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+        if bgr is None:
+            raise BrokenPictureError("a damaged picture")
+        return text_values(self._reader.read(np.asarray(bgr, np.uint8)), self._patterns)

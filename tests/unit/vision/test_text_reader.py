@@ -1,0 +1,160 @@
+"""Printed lines on drawn labels, with the networks of the extra; and by the commands that use them."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.cli.main import app
+from flightd.config.label_text import LabelTextConfig
+from flightd.core.errors import UnavailableError
+from flightd.core.inventory import LocationState, Observation
+from flightd.core.label_values import told_text
+from flightd.core.types import Image
+from flightd.vision.shelf.evidence_jpeg import evidence_jpeg
+from flightd.vision.shelf.label_regions import label_regions
+from flightd.vision.shelf.text_reader import TextReader
+from flightd.vision.shelf.text_search import BrokenPictureError, TextSearch
+from flightd.vision.shelf.text_values import text_values
+
+CONFIG = """
+[mission]
+site = "hall.toml"
+
+[[scan.text]]
+kind = "lot"
+pattern = "LOT\\\\s*([A-Z]\\\\d{4})"
+
+[[scan.text]]
+kind = "expiry"
+pattern = "EXP\\\\s*(\\\\S+)"
+dates = ["%d.%m.%Y"]
+"""
+
+
+def shelf(*lines: str, cut_px: int = 0) -> Image:
+    """A label with these lines, capitals 20 px high, on dark goods; `cut_px` are off its right end."""
+    picture = np.full((400, 700, 3), 60, np.uint8)
+    width = 420 - cut_px
+    label = np.full((60 + 60 * len(lines), 420, 3), 235, np.uint8)
+    for number, text in enumerate(lines):
+        cv2.putText(
+            label, text, (40, 70 + 60 * number), cv2.FONT_HERSHEY_SIMPLEX, 20 / 21, (20,) * 3, 2, cv2.LINE_AA
+        )
+    picture[80 : 80 + label.shape[0], 120 : 120 + width] = label[:, :width]
+    return picture
+
+
+LINES = "LOT B1203", "EXP 31.12.2026"
+
+
+def test_a_region_is_looked_at_that_is_bright_and_written_on() -> None:
+    picture = shelf(*LINES)
+    picture[300:380, 500:690] = 230  # blank paper
+    ((x0, y0, x1, y1),) = label_regions(picture)
+    assert (x0, y0, x1, y1) == pytest.approx((120, 80, 540, 260), abs=20)
+
+
+def test_without_the_extra_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rapidocr", None)
+    with pytest.raises(UnavailableError, match=r"reading text needs what is not installed \(extra ocr\)"):
+        TextReader()
+
+
+def boxes(*corners: tuple[int, int, int, int]) -> list[list[tuple[int, int]]]:
+    return [[(x0, y0), (x1, y0), (x1, y1), (x0, y1)] for x0, y0, x1, y1 in corners]
+
+
+def test_pieces_of_a_line_are_one_and_a_broken_picture_is_no_fault_of_the_reader(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With an engine that finds boxes and tells the width of what it is given to read."""
+
+    class Engine:
+        def __init__(self, **_: object) -> None:
+            pass
+
+        def __call__(self, bgr: Image, use_det: bool, **_: object) -> SimpleNamespace:
+            if use_det:
+                # two pieces of one line, right one first, and a line below
+                return SimpleNamespace(boxes=boxes((90, 20, 150, 40), (20, 21, 80, 41), (20, 60, 100, 80)))
+            words = [SimpleNamespace(confs=[1.0] * len(str(bgr.shape[1])))]
+            return SimpleNamespace(txts=[str(bgr.shape[1])], word_results=words)
+
+    monkeypatch.setitem(sys.modules, "rapidocr", SimpleNamespace(RapidOCR=Engine))
+    search = TextSearch((LabelTextConfig(kind="quantity", pattern=r"(\d+)"),))
+    picture = np.full((120, 200, 3), 235, np.uint8)  # no label stands out: the whole is looked at
+    lines = TextReader().read(picture)
+    assert len(lines) == 2
+    # 130 px long and 20 high, with 0.35 and 0.6 of that at both ends, 0.05 and 0.15 above and below
+    widths = [round(144 * 48 / 22), round(154 * 48 / 26)]
+    assert [look.text for look in lines[0].looks] == list(map(str, widths))
+    assert search(evidence_jpeg(picture))
+    for broken in (b"no picture", evidence_jpeg(picture)[:200]):
+        with pytest.raises(BrokenPictureError):
+            search(broken)
+
+
+def test_lines_are_read_and_a_cut_one_is_not_believed() -> None:
+    pytest.importorskip("rapidocr")
+    reader = TextReader()
+    lot = LabelTextConfig(kind="lot", pattern=r"LOT\s*([A-Z]\d+)")
+    whole = reader.read(shelf("LOT B2345"))
+    (value,) = text_values(whole, (lot,))
+    assert value.value == "B2345"
+    assert value.confidence > 0.9
+    ((x0, y0), _, (x1, y1), _) = whole[0].corners_px
+    assert (x0 + 349.5, y0 + 199.5, x1 + 349.5, y1 + 199.5) == pytest.approx((160, 130, 330, 150), abs=25)
+    cut = text_values(reader.read(shelf("LOT B2345", cut_px=235)), (lot,))
+    assert all(value.confidence == 0.0 for value in cut), [told_text(value.value) for value in cut]
+
+
+def test_the_commands_read_photographs_and_kept_pictures(tmp_path: Path) -> None:
+    pytest.importorskip("rapidocr")
+    config = tmp_path / "hall-flight.toml"
+    config.write_text(CONFIG)
+    photograph = tmp_path / "A-01.png"
+    cv2.imwrite(str(photograph), shelf(*LINES))
+    run = CliRunner()
+    told = json.loads(
+        run.invoke(app, ["codes", str(photograph), "--text", "--config", str(config), "--json"]).stdout
+    )["images"][0]["text"]
+    assert [(line["text"], line["agreed"]) for line in told["lines"]] == [(text, True) for text in LINES]
+    assert [(value["kind"], value["value"]) for value in told["values"]] == [
+        ("lot", "B1203"), ("expiry", "2026-12-31"),
+    ]  # fmt: skip
+    folder = tmp_path / "inventory"
+    with SqliteStore(folder) as store:
+        for place, name in (("A-01", store.keep_evidence(evidence_jpeg(shelf(*LINES)))), ("A-02", "ab" * 32)):
+            store.commit(Observation("r", place, 1, LocationState.UNREADABLE, 0.9, evidence=name))
+    search = ["inventory", "texts", str(folder), "--config", str(config), "--json"]
+    first, second = (json.loads(run.invoke(app, search).stdout) for _ in range(2))
+    assert first == {"searched": 1, "before": 0, "lost": 1, "sure": 2, "unsure": 0}
+    assert second == {"searched": 0, "before": 1, "lost": 1, "sure": 0, "unsure": 0}
+    shown = json.loads(run.invoke(app, ["inventory", "show", str(folder), "--json"]).stdout)["locations"][0]
+    assert [(value["kind"], value["value"], value["source"]) for value in shown["values"]] == [
+        ("lot", "B1203", "text"), ("expiry", "2026-12-31", "text"),
+    ]  # fmt: skip
+
+
+def test_a_configuration_that_says_nothing_of_text_is_refused(tmp_path: Path) -> None:
+    config = tmp_path / "hall.toml"
+    config.write_text('[mission]\nsite = "hall.toml"\n')
+    SqliteStore(tmp_path / "inventory").close()
+    run = CliRunner()
+    for arguments in (
+        ["inventory", "texts", str(tmp_path / "inventory")],
+        ["codes", str(tmp_path), "--text"],
+    ):
+        refused = run.invoke(app, [*arguments, "--config", str(config)])
+        assert "has no [[scan.text]]; add [[scan.text]]" in str(refused.exception)
+    told = run.invoke(app, ["codes", str(tmp_path), "--config", str(config)])
+    assert "add --text" in str(told.exception)
