@@ -29,6 +29,7 @@ _COSTLY = {
     "tests/sim/ideal/test_height_changes.py",
     "tests/sim/pictures/test_shelf_reading.py",
     "tests/unit/cli/test_vision_commands.py",
+    "tests/unit/ground_store/test_ground_store.py",
     "tests/web/test_navigation.py",
 }
 _IN_BROWSER = re.compile(r"tests/web/test_(?:\w*page|language)\.py")

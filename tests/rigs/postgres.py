@@ -32,9 +32,9 @@ def postgres() -> Iterator[str]:
         if os.getuid() == 0:
             shutil.chown(folder, _USER)
         made = ("--username=flightd", "--auth=trust", "--encoding=UTF8", "--locale=C", "--no-sync")
-        _run(folder, [programs / "initdb", f"--pgdata={data}", *made])
+        _run(folder, [str(programs / "initdb"), f"--pgdata={data}", *made])
         options = f"-c listen_addresses='' -c unix_socket_directories={folder} {_FAST}"
-        control = [programs / "pg_ctl", f"--pgdata={data}", "--wait"]
+        control = [str(programs / "pg_ctl"), f"--pgdata={data}", "--wait"]
         _run(folder, [*control, f"--log={folder / 'log'}", f"--options={options}", "start"])
         try:
             yield f"postgresql://flightd@/postgres?host={folder}"
@@ -53,9 +53,7 @@ def _programs() -> Path | None:
     return known[-1].parent if known else None
 
 
-def _run(folder: Path, command: Sequence[Path | str]) -> None:
+def _run(folder: Path, command: Sequence[str]) -> None:
     as_user = ["runuser", "-u", _USER, "--"] if os.getuid() == 0 else []
-    done = subprocess.run(
-        [*as_user, *map(str, command)], cwd=folder, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([*as_user, *command], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"{command[0]}: {done.stderr}"

@@ -18,7 +18,8 @@ def opened_store(address: str, evidence: Path | None = None) -> GroundStore:
     """Made where it is not there yet.  Pictures lie in `evidence`, unless given `FILE-evidence` beside a
     file's store; a store in PostgreSQL needs to be told.
 
-    InputError for an address or a store that is none, or is newer; UnavailableError where it cannot be had."""
+    InputError for an address or a store that is none, or is newer, UnavailableError where it cannot be
+    had."""
     if address.startswith(_POSTGRES):
         if evidence is None:
             raise InputError(

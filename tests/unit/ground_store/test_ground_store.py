@@ -145,7 +145,7 @@ def test_a_run_differs_where_the_count_before_it_said_otherwise(store: GroundSto
 
 
 def _simulated(draw: random.Random) -> list[SentLook]:
-    """Looks of some runs over three months at few places, some more than once, in every state and standing."""
+    """Looks of some runs over three months at few places, in every state and standing."""
     unread = [LocationState.UNREADABLE, LocationState.OCCLUDED]
     looks = []
     for number in range(draw.randint(5, 40)):
@@ -171,7 +171,7 @@ def _expected(looks: list[SentLook]) -> tuple[dict[str, object], dict[str, dict[
     places: dict[str, object] = {one.observation.location: "not_visited" for one in looks}
     places |= {seen.location: (seen.state.value, seen.run) for seen in counting}
     differ: dict[str, dict[str, object]] = {one.observation.run: {} for one in looks}
-    for run in differ:
+    for run, differs in differ.items():
         for place in places:
             here = [seen for seen in counting if seen.location == place]
             own = [i for i, seen in enumerate(here) if seen.run == run]
@@ -179,7 +179,7 @@ def _expected(looks: list[SentLook]) -> tuple[dict[str, object], dict[str, dict[
                 earlier = [s for s in here[: own[-1]] if s.run != run and s.state.is_counted]
                 now = here[own[-1]]
                 if earlier and _says(earlier[-1]) != _says(now):
-                    differ[run][place] = earlier[-1].run
+                    differs[place] = earlier[-1].run
     return places, differ
 
 
