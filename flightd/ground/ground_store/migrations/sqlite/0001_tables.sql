@@ -31,7 +31,7 @@ CREATE TABLE place (
 ) STRICT;
 CREATE INDEX place_by_state ON place (site, state, code);
 CREATE TABLE observation (
-    id BLOB NOT NULL UNIQUE,
+    id BLOB NOT NULL,
     utc_ns INTEGER NOT NULL,
     place INTEGER NOT NULL,
     run INTEGER NOT NULL,
@@ -46,6 +46,7 @@ CREATE TABLE observation (
     evidence BLOB,
     reads TEXT NOT NULL
 ) STRICT;
+CREATE UNIQUE INDEX observation_by_id ON observation (id);
 CREATE INDEX observation_by_place ON observation (place, utc_ns, id);
 CREATE INDEX observation_by_run ON observation (run, utc_ns, id);
 CREATE TABLE difference (
