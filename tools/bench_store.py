@@ -34,7 +34,8 @@ _BEGIN_NS = 1_672_531_200_000_000_000
 _RUN_NS = 2 * 86_400 * 1_000_000_000
 _LOOK_NS = 1_400_000_000
 _CHANGES_EACH = 50
-_READS = """CASE WHEN text = '' THEN '[]' ELSE '[["Code 128","' || text || '",1,2,1.0,[["00","' || text || '"]]]]' END"""
+_LABEL = """'[["Code 128","' || text || '",1,2,1.0,[["00","' || text || '"]]]]'"""
+_READS = f"CASE WHEN text = '' THEN '[]' ELSE {_LABEL} END"
 _STANDS = ("utc_ns", "run", "state", "confidence")
 _DELIVERED = 20
 """Batches."""
@@ -110,10 +111,12 @@ class Bulk:
         with self._engine.writing() as session:
             for index in indexes:
                 session.run(index)
-            session.run("DROP TABLE lies")
+            newest = f"place = place.id AND utc_ns = {at_ns(runs, 0)} + place.id * {_LOOK_NS}"
             for column, value in (("look", "id"), *((name, name) for name in _STANDS)):
-                newest = f"(SELECT {value} FROM observation WHERE place = place.id AND run = {runs})"
-                session.run(f"UPDATE place SET {column} = {newest}")  # noqa: S608
+                session.run(f"UPDATE place SET {column} = (SELECT {value} FROM observation WHERE {newest})")  # noqa: S608
+            texts = f"SELECT {_texts('text')} FROM lies WHERE lies.place = place.id"  # noqa: S608
+            session.run(f"UPDATE place SET texts = ({texts})")  # noqa: S608
+            session.run("DROP TABLE lies")
             if isinstance(session, PostgresSession):
                 for table in ("place", "run"):  # the numbers given here were not drawn from its sequence
                     session.run(f"SELECT setval('{table}_id_seq', {10**6})")

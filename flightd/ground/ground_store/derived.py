@@ -23,7 +23,9 @@ _NEWEST_FIRST = "ORDER BY utc_ns DESC, id DESC LIMIT 1"
 _SINCE = (
     f"SELECT {_COLUMNS} FROM observation WHERE place = ? AND {_CONFIRMED} AND utc_ns >= ? ORDER BY utc_ns, id"
 )
-_OF_RUN = f"SELECT {_COLUMNS} FROM observation WHERE place = ? AND run = ? AND {_CONFIRMED} {_NEWEST_FIRST}"
+_OF_RUN = (  # "+": by place, which has fewer looks than a run
+    f"SELECT {_COLUMNS} FROM observation WHERE place = ? AND +run = ? AND {_CONFIRMED} {_NEWEST_FIRST}"
+)
 _BEFORE = (
     f"SELECT {_COLUMNS} FROM observation WHERE place = ? AND utc_ns <= ? AND (utc_ns, id) < (?, ?)"
     f" AND run <> ? AND {_CONFIRMED} AND {_COUNTED} {_NEWEST_FIRST}"
