@@ -21,6 +21,7 @@ from flightd.cli import (
     report,
     run,
     sim,
+    store,
     train_colour,
 )
 from flightd.cli import map as site_map
@@ -30,7 +31,7 @@ from flightd.cli.exits import run_app
 app = application("flightd")
 for command in (
     detect, evaluate, codes, bench, train_colour, sim, calibrate, plan, run, ground, doctor, report, replay,
-    log, keygen, site_map, inventory, guide,
+    log, keygen, site_map, inventory, store, guide,
 ):  # fmt: skip
     command.register(app)
 

@@ -46,6 +46,23 @@ class FolderEvidence:
         return jpeg
 
 
+class NoEvidence:
+    """Where nobody said where pictures are to lie: fine as long as there are none."""
+
+    def has(self, name: str) -> bool:
+        raise _untold(f"picture {name}")
+
+    def keep(self, jpeg: bytes) -> str:
+        raise _untold(f"a picture of {len(jpeg)} bytes")
+
+    def picture(self, name: str) -> bytes:
+        raise _untold(f"picture {name}")
+
+
+def _untold(what: str) -> InputError:
+    return InputError(f"{what}: the store has no place for it", remedy="say where: --evidence DIR")
+
+
 def checked(name: str) -> str:
     """The name of a picture.  InputError for another."""
     if len(name) != 64 or not set(name) <= set("0123456789abcdef"):

@@ -7,7 +7,7 @@ from pathlib import Path
 from flightd.core.errors import InputError
 from flightd.core.extras import missing_extra
 from flightd.ground.ground_store.engine import Engine
-from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.evidence import FolderEvidence, NoEvidence
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
 
@@ -16,18 +16,12 @@ _POSTGRES = ("postgresql://", "postgres://")
 
 def opened_store(address: str, evidence: Path | None = None) -> GroundStore:
     """Made where it is not there yet.  Pictures lie in `evidence`, unless given `FILE-evidence` beside a
-    file's store; a store in PostgreSQL needs to be told.
+    file's store.
 
     InputError for an address or a store that is none, or is newer, UnavailableError where it cannot be
     had."""
     if address.startswith(_POSTGRES):
-        if evidence is None:
-            raise InputError(
-                "a store in PostgreSQL keeps its pictures beside it",
-                key="--store",
-                remedy="give --evidence DIR",
-            )
-        return GroundStore(_postgres(address), FolderEvidence(evidence))
+        return GroundStore(_postgres(address), NoEvidence() if evidence is None else FolderEvidence(evidence))
     if "://" in address:
         raise InputError(
             "neither a file nor a URL of PostgreSQL",

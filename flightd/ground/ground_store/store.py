@@ -78,6 +78,14 @@ class GroundStore:
                 kept |= {identity.hex(): standing for identity, standing in rows}
         return kept
 
+    def missing_pictures(self, names: Sequence[str]) -> set[str]:
+        """Those that the store has not.  InputError for what names no picture."""
+        return {name for name in names if not self.evidence.has(name)}
+
+    def keep_picture(self, jpeg: bytes) -> str:
+        """Keep a picture, through to the disk; its name."""
+        return self.evidence.keep(jpeg)
+
     def counts(self) -> dict[str, int]:
         """How much the store holds."""
         with self._engine.reading() as session:

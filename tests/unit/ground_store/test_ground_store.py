@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
-import psycopg
 import pytest
 
 from flightd.core.errors import InputError, UnavailableError
@@ -20,36 +19,11 @@ from flightd.ground.ground_store.pages import Mark
 from flightd.ground.ground_store.postgres_engine import PostgresEngine
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
-from tests.rigs.postgres import postgres
 
 _NS = 1_000_000_000
 _DAY = 86_400 * _NS
 _BEGIN = 1_760_000_000 * _NS
 SITE = "hall 3"
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[str]:
-    with postgres() as url:
-        yield url
-
-
-@pytest.fixture(params=["sqlite", "postgres"])
-def engine(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[[], Engine]]:
-    """Opens the same empty database each time."""
-    if request.param == "sqlite":
-        yield lambda: SqliteEngine(tmp_path / "store.db")
-        return
-    url = request.getfixturevalue("cluster")
-    with psycopg.connect(url, autocommit=True) as connection:
-        connection.execute("DROP SCHEMA IF EXISTS flightd CASCADE")
-    yield lambda: PostgresEngine(url)
-
-
-@pytest.fixture
-def store(engine: Callable[[], Engine], tmp_path: Path) -> Iterator[GroundStore]:
-    with GroundStore(engine(), FolderEvidence(tmp_path / "evidence")) as opened:
-        yield opened
 
 
 def read(text: str) -> CodeRead:
