@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flightd.cli.ground.state import State, state_folder
+from flightd.cli.store.options import Pictures, opened
 from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ EXAMPLES = """Examples:
   flightd ground --foxglove 127.0.0.1          for Foxglove, too: it connects to ws://127.0.0.1:8765
   flightd ground --mqtt mqtt://broker --mqtt-version 3.0    for a fleet's manager, by VDA 5050
   flightd ground --mqtt mqtt://broker --mqtt-orders         the manager flies them, as long as no person does
+  flightd ground --folder out --store counts.db             and the ground store, for programs
   flightd ground --listen 0.0.0.0:8443 --tls-cert station.pem --tls-key station.key    for others, who sign in
 """
 
@@ -131,6 +133,17 @@ def ground(
             help="A drone that holds without an order, or without the broker, flies home after so long.",
         ),
     ] = 60.0,
+    store: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE|URL",
+            envvar="FLIGHTD_STORE",
+            help="Feed the ground store with what lies in the folders, and let programs ask it: a file, or"
+            " postgresql://USER@HOST/DATABASE.",
+            show_default=False,
+        ),
+    ] = None,
+    evidence: Pictures = None,
     state: State = None,
 ) -> None:
     """Watch and command drones in the browser: map, cameras, hazards, events; start, pause, go to, STOP.
@@ -172,8 +185,9 @@ def ground(
         hold_s = mqtt_hold if mqtt_orders else None
         fleet = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones, access, hold_s)
         viewers = () if viewer is None else (viewer,)
+        kept = None if store is None else stack.enter_context(opened(store, evidence))
         ended_by = run(
-            drones, where, partial(_say_where, at), access, certificate, folder, viewers, others, fleet
+            drones, where, partial(_say_where, at), access, certificate, folder, viewers, others, fleet, kept
         )
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
