@@ -27,9 +27,9 @@ from flightd.ground.browser import Browser
 from flightd.ground.doctor.routes import doctor_routes
 from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.routes import flight_routes
+from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.guards import Guard, Hosts
 from flightd.ground.guide_pages.routes import guide_routes
-from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, is_json, json_body, status_of
 from flightd.ground.manager_routes import Managers, manager_routes

@@ -21,9 +21,9 @@ from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.access.access import Access
 from flightd.ground.application import application
 from flightd.ground.flights.flights import Flights
-from flightd.ground.guards import own_hosts
 from flightd.ground.ground_store.feeder import Feeder
 from flightd.ground.ground_store.store import GroundStore
+from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
 from flightd.ground.page_person import PagePeople

@@ -79,7 +79,7 @@ def listed(state: State = None, as_json: AsJson = False) -> None:
             "scopes": sorted(key.scopes),
             "made": f"{datetime.fromtimestamp(key.made_s, UTC):%Y-%m-%d %H:%M:%S} UTC",
         }
-        for key in _book(state).keys()
+        for key in _book(state).all()
     ]
     if as_json:
         print(json.dumps({"keys": keys}))

@@ -251,7 +251,7 @@ class Access:
     def _read(self) -> None:
         """Everybody anew, at one stroke for the loop."""
         people, sessions = self._book.read()
-        keys = self._keys.keys()
+        keys = self._keys.all()
         self._scoped = {key.hash: key for key in keys}
         self._people = {person.name.casefold(): person for person in people}
         self._by_key = {person.key: person for person in people if person.key}

@@ -65,7 +65,7 @@ class KeyBook:
             private=True,
         )
 
-    def keys(self) -> list[ScopedKey]:
+    def all(self) -> list[ScopedKey]:
         """All of them, by name."""
         if not self._database.file.exists():
             return []

@@ -26,8 +26,8 @@ class Line(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """`role` None: anybody, without signing in; nothing that is anybody's business may be behind it.  A key with
-    scopes needs the `scope`, and may nothing where there is none."""
+    """`role` None: anybody, without signing in; nothing that is anybody's business may be behind it.  A key
+    with scopes needs the `scope`, and may nothing where there is none."""
 
     role: Role | None
     line: Line

@@ -96,6 +96,7 @@ class GroundStore:
                 "looks": int(session.rows("SELECT coalesce(sum(looks), 0) FROM run")[0][0]),
                 "flights": session.rows("SELECT count(*) FROM flight")[0][0],
                 "decisions": session.rows("SELECT count(*) FROM decision")[0][0],
+                "audit": session.rows("SELECT count(*) FROM audit")[0][0],
             }
 
     def sites(self) -> list[dict[str, Any]]:

@@ -1,1 +1,1 @@
-"""The ground store over HTTP, for programs: `endpoints` is what there is, `routes` serves it, `openapi` tells it."""
+"""The ground store over HTTP, for programs: `endpoints` says what there is, `openapi` and `routes` follow."""

@@ -1,4 +1,4 @@
-"""What a program can read of the store: each endpoint once, for the routes and for the document about them."""
+"""What a program can read of the store: each endpoint once, for the routes and the document about them."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """`rows` answers with a page from parameters that were read; `after` names the field of the last row by which
-    the next page is asked for, "" where all fits on one, `mark` where it is time and id."""
+    """`rows` answers with a page from parameters that were read.  `after` names the field of the last row by
+    which the next page is asked for: "" where all fits on one, `mark` where it is time and id."""
 
     path: str
     summary: str
