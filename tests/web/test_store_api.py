@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import shutil
@@ -249,3 +250,37 @@ def test_a_store_that_is_away_is_fed_when_it_is_back(
         assert len([line for line in told if "inventory monday: not in the ground store" in line]) == 1
         feeder.feed()
         assert store.counts()["looks"] == 10
+
+
+@in_real_time
+async def test_a_folder_is_delivered_to_a_station_and_pruned_there(
+    hall: Path, tmp_path: Path, flightd: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inventory = tmp_path / "drone"
+    counted_store(inventory)
+    headers = _keyed(tmp_path / "state", Scope.DELIVER, name="drone-1")
+    with opened_store(str(tmp_path / "store.db")) as store:
+        async with served(NOBODY, folder=hall, state=tmp_path / "state", store=store) as station:
+            to = ("--store", station.origin)
+            refused = await asyncio.to_thread(flightd, "store", "deliver", inventory, *to)
+            assert (refused.returncode, "FLIGHTD_STORE_KEY: a station asks for a key" in refused.stderr) == (
+                2,
+                True,
+            )
+            monkeypatch.setenv("FLIGHTD_STORE_KEY", headers["Authorization"].removeprefix("Bearer "))
+            sent = ("store", "deliver", inventory, "--site", "hall 3", "--json", *to)
+            for new, pictures in ((10, 1), (0, 0)):
+                ended = await asyncio.to_thread(flightd, *sent)
+                told = json.loads(ended.stdout)
+                assert (told["looks"], told["already"], told["pictures"]) == (new, 10 - new, pictures)
+            ended = await asyncio.to_thread(flightd, "store", "prune", inventory, "--json", *to)
+            assert json.loads(ended.stdout) == {"looks": 1, "pictures": 0, "stay": 0}
+            monkeypatch.setenv("FLIGHTD_STORE_KEY", "none")
+            ended = await asyncio.to_thread(flightd, *sent)
+            assert (ended.returncode, "the station answers: this key is nobody's here" in ended.stderr) == (
+                2,
+                True,
+            )
+        ended = await asyncio.to_thread(flightd, *sent)
+        assert (ended.returncode, "the station cannot be had" in ended.stderr) == (2, True)
+        assert store.stock("hall 3")[1]["texts"] == [f"00{SSCC}"]

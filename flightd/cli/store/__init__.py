@@ -5,12 +5,12 @@ from __future__ import annotations
 import typer
 
 from flightd.cli.application import group
-from flightd.cli.store import deliver, show
+from flightd.cli.store import deliver, export, show
 
 
 def register(app: typer.Typer) -> None:
     """Hang `store` with its commands under `app`."""
     commands = group("flightd store deliver out --store counts.db\nflightd store show --store counts.db")
-    for command in (deliver, show):
+    for command in (deliver, show, export):
         command.register(commands)
-    app.add_typer(commands, name="store", help="All counts over the years: deliver, prune, show.")
+    app.add_typer(commands, name="store", help="All counts over the years: deliver, prune, show, export.")

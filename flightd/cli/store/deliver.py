@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from flightd.cli.options import AsJson
-from flightd.cli.store.options import Pictures, Store, opened
+from flightd.cli.store.options import Pictures, StoreOrStation, target
 
 
 def register(app: typer.Typer) -> None:
@@ -25,7 +25,7 @@ def deliver(
         list[Path],
         typer.Argument(metavar="PATH…", exists=True, help="Folders, an inventory.db, or flight logs."),
     ],
-    store: Store,
+    store: StoreOrStation,
     evidence: Pictures = None,
     site: Annotated[
         str,
@@ -46,14 +46,15 @@ def deliver(
     Examples:
       flightd store deliver out --store counts.db
       flightd store deliver /var/lib/flightd --store postgresql://flightd@db/counts --evidence /srv/evidence
+      FLIGHTD_STORE_KEY=… flightd store deliver /var/lib/flightd --store https://ground.hall:8443
     """
-    with opened(store, evidence) as target:
+    with target(store, evidence) as into:
         from flightd.ground.ground_store.deliver_folder import deliver_path
         from flightd.ground.ground_store.sender import Delivered
 
         done = Delivered()
         for path in paths:
-            deliver_path(path, site, source or platform.node(), target, done)
+            deliver_path(path, site, source or platform.node(), into, done)
     if as_json:
         print(json.dumps(asdict(done)))
         return
@@ -67,7 +68,7 @@ def prune(
     folder: Annotated[
         Path, typer.Argument(metavar="FOLDER", exists=True, file_okay=False, help="Folder of an inventory.")
     ],
-    store: Store,
+    store: StoreOrStation,
     evidence: Pictures = None,
     as_json: AsJson = False,
 ) -> None:
@@ -80,10 +81,10 @@ def prune(
     Examples:
       flightd store prune /var/lib/flightd/inventory --store counts.db
     """
-    with opened(store, evidence) as target:
+    with target(store, evidence) as into:
         from flightd.ground.ground_store.prune import prune as prune_folder
 
-        pruned = prune_folder(folder, target)
+        pruned = prune_folder(folder, into)
     if as_json:
         print(json.dumps(asdict(pruned)))
         return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Self
 
 from flightd.core.errors import InputError
@@ -15,6 +16,7 @@ from flightd.ground.ground_store.engine import Engine, Session, listed
 from flightd.ground.ground_store.evidence import Evidence
 from flightd.ground.ground_store.migrations import brought_up
 from flightd.ground.ground_store.pages import MOST_ROWS, Mark
+from flightd.ground.ground_store.parquet import export
 from flightd.ground.ground_store.take_batch import Taken, take_batch
 
 
@@ -98,6 +100,10 @@ class GroundStore:
                 "decisions": session.rows("SELECT count(*) FROM decision")[0][0],
                 "audit": session.rows("SELECT count(*) FROM audit")[0][0],
             }
+
+    def export(self, site: str, folder: Path) -> dict[str, int]:
+        """As `parquet.export`."""
+        return export(self._engine, site, folder)
 
     def sites(self) -> list[dict[str, Any]]:
         """As `pages.sites`."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import random
 from collections.abc import Callable
 from pathlib import Path
 
+import duckdb
 import pytest
 
 from flightd.core.errors import InputError, UnavailableError
@@ -293,3 +295,27 @@ def test_a_database_that_cannot_be_had_is_told_in_a_line(tmp_path: Path) -> None
         GroundStore(SqliteEngine(tmp_path / "other.db"), evidence)
     with pytest.raises(InputError, match="not a URL of PostgreSQL"):
         PostgresEngine("postgresql://ann:sec%ret@/x")
+
+
+def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> None:
+    store.take(batch(look("A-1", 'a"b,\n', run="monday"), look("A-2", standing=Standing.PENDING)))
+    store.take(batch(look("A-1", run="tuesday", at_ns=_BEGIN + _DAY + 7), look("A-9", "x")))
+    store.take(batch(look("A-1", "other"), site="hall 4"))
+    assert store.export(SITE, tmp_path / "it's out") == {"observations": 4, "differences": 1}
+    observations = str(tmp_path / "it's out" / "observations.parquet").replace("'", "''")
+    differences = observations.replace("observations", "differences")
+    told = duckdb.sql(
+        f"SELECT site, run, location, state, epoch_ns(utc), evidence, reads FROM '{observations}'"
+        " ORDER BY utc, location"
+    ).fetchall()
+    assert [row[2:5] for row in told] == [
+        ("A-1", "read", _BEGIN), ("A-2", "empty", _BEGIN), ("A-9", "read", _BEGIN),
+        ("A-1", "empty", _BEGIN + _DAY + 7),
+    ]  # fmt: skip
+    assert (told[0][:2], told[0][5], json.loads(told[0][6])[0][1]) == ((SITE, "monday"), None, 'a"b,\n')
+    assert json.loads(told[2][6])[0][1] == "x"
+    changed = duckdb.sql(f"SELECT location, change, before_texts FROM '{differences}'").fetchall()
+    assert changed == [("A-1", "gone", json.dumps(['a"b,\n']))]
+    assert store.export("", tmp_path / "all")["observations"] == 5
+    with pytest.raises(InputError, match="there is no site 'hall 9'"):
+        store.export("hall 9", tmp_path / "none")
