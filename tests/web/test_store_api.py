@@ -254,13 +254,13 @@ def test_a_store_that_is_away_is_fed_when_it_is_back(
 
 @in_real_time
 async def test_a_folder_is_delivered_to_a_station_and_pruned_there(
-    hall: Path, tmp_path: Path, flightd: Command, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, flightd: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     inventory = tmp_path / "drone"
     counted_store(inventory)
     headers = _keyed(tmp_path / "state", Scope.DELIVER, name="drone-1")
     with opened_store(str(tmp_path / "store.db")) as store:
-        async with served(NOBODY, folder=hall, state=tmp_path / "state", store=store) as station:
+        async with served(NOBODY, state=tmp_path / "state", store=store) as station:
             to = ("--store", station.origin)
             refused = await asyncio.to_thread(flightd, "store", "deliver", inventory, *to)
             assert (refused.returncode, "FLIGHTD_STORE_KEY: a station asks for a key" in refused.stderr) == (

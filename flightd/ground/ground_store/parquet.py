@@ -17,12 +17,12 @@ _LOOKS = (
     "SELECT observation.utc_ns, observation.id, site.name, run.name, place.code, observation.state,"
     " observation.confidence, standing, observation.node, x_m, y_m, height_m, yaw_rad, observation.evidence,"
     " reads FROM observation JOIN place ON place.id = observation.place JOIN run ON run.id = observation.run"
-    " JOIN site ON site.id = run.site WHERE observation.run = ? AND (observation.utc_ns, observation.id) > (?, ?)"
-    " ORDER BY observation.utc_ns, observation.id LIMIT ?"
+    " JOIN site ON site.id = run.site WHERE observation.run = ?"
+    " AND (observation.utc_ns, observation.id) > (?, ?) ORDER BY observation.utc_ns, observation.id LIMIT ?"
 )
 _DIFFERENCES = (
-    "SELECT utc_ns, look, site.name, run.name, code, kind, state, texts, before_ns, before_state, before_texts"
-    " FROM difference JOIN run ON run.id = difference.run JOIN site ON site.id = run.site"
+    "SELECT utc_ns, look, site.name, run.name, code, kind, state, texts, before_ns, before_state,"
+    " before_texts FROM difference JOIN run ON run.id = difference.run JOIN site ON site.id = run.site"
     " WHERE difference.run = ? AND code > ? ORDER BY code LIMIT ?"
 )
 TABLES = {

@@ -1,4 +1,4 @@
-"""The store of a ground station, from elsewhere: drones deliver over HTTPS, by keys of the scope `deliver`."""
+"""The store of a ground station, from elsewhere: drones deliver over HTTPS, by keys of scope `deliver`."""
 
 from __future__ import annotations
 

@@ -224,7 +224,7 @@ def test_an_inventory_of_no_known_site_is_refused(store: GroundStore, tmp_path: 
     deliver_path(tmp_path / "monday", SITE, "station", store, Delivered())
     assert store.counts()["looks"] == 10
     (tmp_path / "empty").mkdir()
-    with pytest.raises(InputError, match="neither an inventory.db nor a flight log"):
+    with pytest.raises(InputError, match=r"neither an inventory\.db nor a flight log"):
         deliver_path(tmp_path / "empty", SITE, "station", store, Delivered())
 
 
