@@ -23,6 +23,7 @@ from flightd.ground.application import application
 from flightd.ground.flights.flights import Flights
 from flightd.ground.ground_store.feeder import Feeder
 from flightd.ground.ground_store.store import GroundStore
+from flightd.ground.ground_store.webhooks import Webhook
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
@@ -144,6 +145,7 @@ def run(
     others: Sequence[ReadFolder] = (),
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
+    hooks: Sequence[Webhook] = (),
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
     InputError where it must not be listened at (`check_reach`)."""
@@ -178,11 +180,12 @@ async def serve(
     others: Sequence[ReadFolder] = (),
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
+    hooks: Sequence[Webhook] = (),
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
     end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are;
-    `fleet` has the drones flown by somebody else's manager; `store` is fed with what lies there, and asked by
-    programs."""
+    `fleet` has the drones flown by somebody else's manager; `store` is fed with what lies there, asked by
+    programs, and `hooks` are told of it."""
     viewers = viewers if fleet is None else (*viewers, fleet)
     hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
@@ -237,6 +240,8 @@ async def serve(
         if store is not None:
             feeder = Feeder(store, folder, others, access.state)
             tasks.create_task(feeder.run(), name="ground store")
+            for hook in hooks:
+                tasks.create_task(hook.run(store), name="webhook")
         if access.login or store is not None:  # keys are for this machine's programs, too
             tasks.create_task(access.run(), name="people")
         if access.login:

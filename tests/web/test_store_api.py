@@ -219,7 +219,12 @@ def test_the_station_feeds_what_changes_and_no_more(
         assert (store.counts()["looks"], store.counts()["audit"]) == (10, 3)
         taken: list[Batch] = []
         take: Callable[[Batch], object] = store.take
-        monkeypatch.setattr(store, "take", lambda batch: (taken.append(batch), take(batch))[1])
+
+        def noted(batch: Batch) -> object:
+            taken.append(batch)
+            return take(batch)
+
+        monkeypatch.setattr(store, "take", noted)
         feeder.feed()
         assert taken == []
         (state / "audit.jsonl").rename(state / "audit.jsonl.1")

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import Address
     from flightd.ground.access.access import Access
     from flightd.ground.foxglove_view.live_server import FoxgloveServer
+    from flightd.ground.ground_store.webhooks import Webhook
     from flightd.ground.mqtt.fleet_link import FleetLink
     from flightd.ground.read_folders import ReadFolder
     from flightd.ground.server import Listening
@@ -144,6 +145,15 @@ def ground(
         ),
     ] = None,
     evidence: Pictures = None,
+    webhook: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="URL",
+            help="Tell this address of new runs, differences and decisions in the store, several by several"
+            " options; signed with the secret in FLIGHTD_WEBHOOK_SECRET.",
+            show_default=False,
+        ),
+    ] = None,
     state: State = None,
 ) -> None:
     """Watch and command drones in the browser: map, cameras, hazards, events; start, pause, go to, STOP.
@@ -185,9 +195,20 @@ def ground(
         hold_s = mqtt_hold if mqtt_orders else None
         fleet = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones, access, hold_s)
         viewers = () if viewer is None else (viewer,)
+        hooks = _webhooks(webhook or (), store)
         kept = None if store is None else stack.enter_context(opened(store, evidence))
         ended_by = run(
-            drones, where, partial(_say_where, at), access, certificate, folder, viewers, others, fleet, kept
+            drones,
+            where,
+            partial(_say_where, at),
+            access,
+            certificate,
+            folder,
+            viewers,
+            others,
+            fleet,
+            kept,
+            hooks,
         )
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
@@ -206,6 +227,14 @@ def _others(folder: Path | None, flights: Sequence[Path]) -> tuple[ReadFolder, .
             what = "is no folder" if path.exists() else "there is no such folder yet"
             print(f"flightd: --flights {path}: {what}", file=sys.stderr)
     return read_folders(flights)
+
+
+def _webhooks(urls: Sequence[str], store: str | None) -> list[Webhook]:
+    from flightd.ground.ground_store.webhooks import SECRET, Webhook
+
+    if urls and store is None:
+        raise InputError("there is no store to tell of", key="--webhook", remedy="give --store FILE")
+    return [Webhook(url, os.environ.get(SECRET, "")) for url in urls]
 
 
 def _foxglove_server(address: str, login: bool, drones: Sequence[tuple[str, Address]]) -> FoxgloveServer:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from flightd.core.inventory import LocationState, Standing
 from flightd.ground.ground_store.engine import Row, Session, listed
+from flightd.ground.ground_store.events import EventKind, Noted
 from flightd.ground.ground_store.reads_text import texts_of
 from flightd.inventory.count_change import change_between
 
@@ -113,16 +114,36 @@ class _Written:
             )  # fmt: skip
 
 
-def renew(session: Session, touched: Sequence[Touched]) -> None:
+def renew(session: Session, touched: Sequence[Touched], noted: Noted) -> None:
     """Bring up to date what follows from looks that were just written."""
     newest = _newest(session, [place.place for place in touched])
     written = _Written()
     for place in touched:
         if not _follows_on(place, newest[place.place], written):
             _renew_place(session, place, written)
+    if noted.wanted:
+        _note_changes(session, written, noted)
     session.run_many(_STANDS, written.stands)
     session.run_many("DELETE FROM difference WHERE run = ? AND code = ?", written.gone)
     session.run_many(_DIFFERS, written.differs)
+
+
+def _note_changes(session: Session, written: _Written, noted: Noted) -> None:
+    """What differs now and did not so before, and the other way round."""
+    names: dict[int, str] = {}
+    before: dict[tuple[int, str], tuple[str, bytes]] = {}
+    for run in {run for run, _ in written.gone}:
+        names[run] = session.rows("SELECT name FROM run WHERE id = ?", run)[0][0]
+        for marks, part in listed([code for of, code in written.gone if of == run]):
+            question = f"SELECT code, kind, look FROM difference WHERE run = ? AND code IN {marks}"
+            before |= {(run, code): (kind, look) for code, kind, look in session.rows(question, run, *part)}
+    now = {(row[0], row[1]): (row[2], row[4]) for row in written.differs}
+    for (run, code), (kind, look) in now.items():
+        if before.get((run, code)) != (kind, look):
+            told = {"run": names[run], "location": code, "change": kind, "look": look.hex()}
+            noted.note(EventKind.DIFFERENCE_FOUND, told)
+    for run, code in sorted(before.keys() - now.keys()):
+        noted.note(EventKind.DIFFERENCE_GONE, {"run": names[run], "location": code})
 
 
 def _newest(session: Session, places: Sequence[int]) -> dict[int, tuple[int, bytes, int, str] | None]:

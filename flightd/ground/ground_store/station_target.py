@@ -39,7 +39,7 @@ class StationTarget:
             )
         self.shown = url.rstrip("/")
         self._key = key
-        self._opener = urllib.request.build_opener(urllib.request.ProxyHandler({}), _NoRedirect())
+        self._opener = urllib.request.build_opener(urllib.request.ProxyHandler({}), NoRedirect())
 
     def standings(self, looks: Sequence[str]) -> dict[str, int]:
         return self._ask("/standings", msgspec.json.encode({"names": looks}), dict[str, int])
@@ -67,12 +67,12 @@ class StationTarget:
             refused = UnavailableError if err.code >= 500 else InputError
             raise refused(f"the station answers: {why}", file=self.shown) from None
         except (OSError, msgspec.DecodeError) as err:
-            why = getattr(err, "reason", None) or err
-            raise UnavailableError(f"the station cannot be had: {why}", file=self.shown) from None
+            reason = getattr(err, "reason", None) or err
+            raise UnavailableError(f"the station cannot be had: {reason}", file=self.shown) from None
 
 
-class _NoRedirect(urllib.request.HTTPRedirectHandler):
-    """The key goes to the station that was named and nowhere else."""
+class NoRedirect(urllib.request.HTTPRedirectHandler):
+    """What is sent goes to whom was named and to nobody else."""
 
     def redirect_request(self, *_: Any) -> None:
         return None

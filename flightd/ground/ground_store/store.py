@@ -10,9 +10,10 @@ from typing import Any, Self
 
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
-from flightd.ground.ground_store import pages
+from flightd.ground.ground_store import events, pages
 from flightd.ground.ground_store.batch import Batch, Receipt
 from flightd.ground.ground_store.engine import Engine, Session, listed
+from flightd.ground.ground_store.events import Event
 from flightd.ground.ground_store.evidence import Evidence
 from flightd.ground.ground_store.migrations import brought_up
 from flightd.ground.ground_store.pages import MOST_ROWS, Mark
@@ -60,7 +61,7 @@ class GroundStore:
             if session.rows("SELECT 1 FROM delivery WHERE id = ?", identity):
                 taken = Taken()
             else:
-                taken = take_batch(self._engine, session, batch)
+                taken = take_batch(self._engine, session, batch, self._utc_ns())
                 session.run(
                     "INSERT INTO delivery VALUES (?, ?, ?, ?)",
                     identity,
@@ -87,6 +88,17 @@ class GroundStore:
     def keep_picture(self, jpeg: bytes) -> str:
         """Keep a picture, through to the disk; its name."""
         return self.evidence.keep(jpeg)
+
+    def waiting_events(self, hook: str, most: int) -> tuple[list[Event], int]:
+        """As `events.waiting`, of a hook that is known from now on."""
+        with self._engine.writing() as session:
+            events.register(session, hook)
+            return events.waiting(session, hook, most)
+
+    def event_taken(self, hook: str, event: int) -> None:
+        """As `events.taken`."""
+        with self._engine.writing() as session:
+            events.taken(session, hook, event)
 
     def counts(self) -> dict[str, int]:
         """How much the store holds."""

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from flightd.core.inventory import Observation, PlannedLocation, Standing
-from flightd.ground.ground_store.batch import Batch, SentLook
+from flightd.ground.ground_store.batch import Batch, SentDecision, SentLook
 from flightd.ground.ground_store.derived import Moment, Touched, renew
 from flightd.ground.ground_store.engine import Engine, Session, listed
+from flightd.ground.ground_store.events import EventKind, Noted
 from flightd.ground.ground_store.reads_text import reads_text
 
 _LOOK = f"INSERT INTO observation VALUES ({', '.join('?' * 14)}) ON CONFLICT DO NOTHING"
@@ -34,13 +35,15 @@ class Taken:
     changed: int = 0
 
 
-def take_batch(engine: Engine, session: Session, batch: Batch) -> Taken:
+def take_batch(engine: Engine, session: Session, batch: Batch, utc_ns: int) -> Taken:
     """Everything of the batch, in the caller's transaction, and what is derived of it."""
     taken = Taken()
     if batch.site:
-        site = _site(session, batch.site)
-        taken = _take_looks(engine, session, site, batch.places, batch.looks)
+        site, noted = _site(session, batch.site), Noted(session, batch.site, utc_ns)
+        taken = _take_looks(engine, session, site, batch.places, batch.looks, noted)
         _take_flights(session, site, batch)
+        _take_decisions(session, site, batch.decisions, noted)
+        noted.write()
     session.run_many(
         _PERSON, [(batch.source, person.name, person.role, person.seen_ns) for person in batch.people]
     )
@@ -62,10 +65,18 @@ def _take_flights(session: Session, site: int, batch: Batch) -> None:
             for f in batch.flights
         ],
     )  # fmt: skip
+
+
+def _take_decisions(session: Session, site: int, decisions: Sequence[SentDecision], noted: Noted) -> None:
+    known: set[str] = set()
+    for marks, part in listed([decision.id for decision in decisions]):
+        known |= {row[0] for row in session.rows(f"SELECT id FROM decision WHERE id IN {marks}", *part)}
+    new = {decision.id: decision for decision in decisions if decision.id not in known}.values()
     session.run_many(
-        _DECISION,
-        [(d.id, site, d.place, d.utc_ns, d.seen_ns, d.what, d.who, d.note) for d in batch.decisions],
+        _DECISION, [(d.id, site, d.place, d.utc_ns, d.seen_ns, d.what, d.who, d.note) for d in new]
     )
+    for one in new:
+        noted.note(EventKind.PLACE_DECIDED, {"location": one.place, "what": one.what, "who": one.who})
 
 
 def _take_looks(
@@ -74,6 +85,7 @@ def _take_looks(
     site: int,
     planned: Sequence[PlannedLocation],
     looks: Sequence[SentLook],
+    noted: Noted,
 ) -> Taken:
     nodes = {place.code: place.node for place in planned}
     for look in looks:
@@ -90,7 +102,7 @@ def _take_looks(
     risen = [
         look for identity, look in unique.items() if look.standing > kept.get(bytes.fromhex(identity), 99)
     ]
-    runs = _runs(session, site, [look.observation for look in new])
+    runs = _runs(session, site, [look.observation for look in new], noted)
     engine.make_room(session, {look.observation.utc_ns for look in new})
     session.run_many(_LOOK, [_row(look, places, runs) for look in new])
     session.run_many(
@@ -98,7 +110,7 @@ def _take_looks(
         [(int(look.standing), bytes.fromhex(look.observation.id), look.observation.utc_ns) for look in risen],
     )
     runs |= _run_ids(session, site, {look.observation.run for look in risen})
-    renew(session, _touched([*new, *risen], places, runs))
+    renew(session, _touched([*new, *risen], places, runs), noted)
     return Taken(len(new), len(risen))
 
 
@@ -144,12 +156,15 @@ def _kept(session: Session, looks: Iterable[SentLook]) -> dict[bytes, int]:
     return kept
 
 
-def _runs(session: Session, site: int, looks: Sequence[Observation]) -> dict[str, int]:
+def _runs(session: Session, site: int, looks: Sequence[Observation], noted: Noted) -> dict[str, int]:
     """The ids of the runs of looks that are new; how many a run has, and between when, is kept beside it."""
     by_run: dict[str, list[int]] = {}
     for look in looks:
         by_run.setdefault(look.run, []).append(look.utc_ns)
+    known = _run_ids(session, site, set(by_run))
     for name, times in by_run.items():
+        if name not in known:
+            noted.note(EventKind.RUN_NEW, {"run": name})
         session.run(
             "INSERT INTO run (site, name, began_ns, ended_ns, looks) VALUES (?, ?, ?, ?, 0)"
             " ON CONFLICT DO NOTHING",

@@ -6,6 +6,7 @@ import json
 import random
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
@@ -297,6 +298,12 @@ def test_a_database_that_cannot_be_had_is_told_in_a_line(tmp_path: Path) -> None
         PostgresEngine("postgresql://ann:sec%ret@/x")
 
 
+def _asked(question: str) -> list[tuple[Any, ...]]:
+    relation = duckdb.sql(question)
+    assert relation is not None
+    return relation.fetchall()
+
+
 def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> None:
     store.take(batch(look("A-1", 'a"b,\n', run="monday"), look("A-2", standing=Standing.PENDING)))
     store.take(batch(look("A-1", run="tuesday", at_ns=_BEGIN + _DAY + 7), look("A-9", "x")))
@@ -304,17 +311,17 @@ def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> No
     assert store.export(SITE, tmp_path / "it's out") == {"observations": 4, "differences": 1}
     observations = str(tmp_path / "it's out" / "observations.parquet").replace("'", "''")
     differences = observations.replace("observations", "differences")
-    told = duckdb.sql(
+    told = _asked(
         f"SELECT site, run, location, state, epoch_ns(utc), evidence, reads FROM '{observations}'"
         " ORDER BY utc, location"
-    ).fetchall()
+    )
     assert [row[2:5] for row in told] == [
         ("A-1", "read", _BEGIN), ("A-2", "empty", _BEGIN), ("A-9", "read", _BEGIN),
         ("A-1", "empty", _BEGIN + _DAY + 7),
     ]  # fmt: skip
     assert (told[0][:2], told[0][5], json.loads(told[0][6])[0][1]) == ((SITE, "monday"), None, 'a"b,\n')
     assert json.loads(told[2][6])[0][1] == "x"
-    changed = duckdb.sql(f"SELECT location, change, before_texts FROM '{differences}'").fetchall()
+    changed = _asked(f"SELECT location, change, before_texts FROM '{differences}'")
     assert changed == [("A-1", "gone", json.dumps(['a"b,\n']))]
     assert store.export("", tmp_path / "all")["observations"] == 5
     with pytest.raises(InputError, match="there is no site 'hall 9'"):
