@@ -156,7 +156,18 @@ def run(
     async def until_signal() -> None:
         serving = asyncio.ensure_future(
             serve(
-                drones, listener, where, access, on_ready, certificate, folder, viewers, others, fleet, store
+                drones,
+                listener,
+                where,
+                access,
+                on_ready,
+                certificate,
+                folder,
+                viewers,
+                others,
+                fleet,
+                store,
+                hooks,
             )
         )
         end_on_signals(serving, came)

@@ -61,9 +61,9 @@ class Noted:
         kept = self._session.rows("SELECT id FROM event ORDER BY id DESC LIMIT 1 OFFSET ?", MOST_EVENTS)
         if kept:
             last = kept[0][0]
+            lost = "SELECT count(*) FROM event WHERE id > sent AND id <= ?"
             self._session.run(
-                "UPDATE hook SET dropped = dropped + (SELECT count(*) FROM event WHERE id > sent AND id <= ?),"
-                " sent = CASE WHEN sent < ? THEN ? ELSE sent END",
+                f"UPDATE hook SET dropped = dropped + ({lost}), sent = CASE WHEN sent < ? THEN ? ELSE sent END",
                 last, last, last,
             )  # fmt: skip
             self._session.run("DELETE FROM event WHERE id <= ?", last)

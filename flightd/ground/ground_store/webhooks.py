@@ -49,7 +49,7 @@ class Webhook:
         self._opener = urllib.request.build_opener(urllib.request.ProxyHandler({}), NoRedirect())
 
     async def run(self, store: GroundStore) -> None:
-        """Until cancelled.  An event that is not taken is sent again, later and later; those after it wait."""
+        """Until cancelled.  One that is not taken is sent again, later and later; those after it wait."""
         delay_s, failure = _FIRST_S, ""
         while True:
             try:
@@ -66,7 +66,7 @@ class Webhook:
                 await asyncio.sleep(_LOOK_S)
 
     def tell(self, store: GroundStore) -> bool:
-        """Send what waits, oldest first; whether there may be more.  UnavailableError at the first that is not
+        """Send what waits, oldest first; whether there may be more.  UnavailableError at one that is not
         taken."""
         events, dropped = store.waiting_events(self.url, _AT_ONCE)
         for event in events:

@@ -1,4 +1,4 @@
-"""Whoever asked to be told is told of everything once it is in the store, in order, signed, and again if need be."""
+"""Whoever asked to be told is told of what is in the store: in order, signed, again until he has it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from typing import Any
 
@@ -90,11 +91,12 @@ def test_everything_is_told_in_order_and_again_until_it_is_taken(store: GroundSt
         ]  # fmt: skip
         assert [one["site"] for one in receiver.heard] == ["hall 3"] * 4
         assert sorted({one["id"] for one in receiver.heard}) == [one["id"] for one in receiver.heard]
-        store.take(counted(1, "late", "looks"))  # run 2 was compared with another look of run 1
-        late = counted(0)
-        store.take(late)
+        (withdrawn,) = counted(2).looks
+        store.take(Batch("hall 3", "north", looks=(replace(withdrawn, standing=Standing.WITHDRAWN),)))
         hook.tell(store)
-        assert receiver.heard[4:][0]["event"] == "difference.found"
+        assert [(one["event"], one["run"]) for one in receiver.heard[4:]] == [
+            ("difference.found", "run 3"), ("difference.gone", "run 2"),
+        ]  # fmt: skip
 
 
 def test_what_nobody_takes_is_bounded_and_counted(
