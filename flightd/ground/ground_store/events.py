@@ -63,7 +63,8 @@ class Noted:
             last = kept[0][0]
             lost = "SELECT count(*) FROM event WHERE id > sent AND id <= ?"
             self._session.run(
-                f"UPDATE hook SET dropped = dropped + ({lost}), sent = CASE WHEN sent < ? THEN ? ELSE sent END",
+                f"UPDATE hook SET dropped = dropped + ({lost}),"
+                " sent = CASE WHEN sent < ? THEN ? ELSE sent END",
                 last, last, last,
             )  # fmt: skip
             self._session.run("DELETE FROM event WHERE id <= ?", last)
