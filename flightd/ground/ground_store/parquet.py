@@ -116,7 +116,7 @@ def _convert(duckdb: Any, text: Path, parquet: Path, columns: dict[str, str]) ->
         for name, kind in columns.items()
     )
     types = ", ".join(f"'{name}': '{kind}'" for name, kind in read.items())
-    options = f"header = false, quote = '\"', escape = '\"', nullstr = '{_NONE}', columns = {{{types}}}"
+    options = f"auto_detect = false, parallel = false, header = false, quote = '\"', escape = '\"', nullstr = '{_NONE}', columns = {{{types}}}"
     with duckdb.connect() as connection:
         try:
             connection.execute(

@@ -324,5 +324,8 @@ def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> No
     changed = _asked(f"SELECT location, change, before_texts FROM '{differences}'")
     assert changed == [("A-1", "gone", json.dumps(['a"b,\n']))]
     assert store.export("", tmp_path / "all")["observations"] == 5
+    store.take(batch(places=(PlannedLocation("A-1", "A1"),), site="hall 5"))  # nobody looked yet
+    assert store.export("hall 5", tmp_path / "empty") == {"observations": 0, "differences": 0}
+    assert _asked(f"SELECT * FROM '{tmp_path / 'empty' / 'observations.parquet'}'") == []
     with pytest.raises(InputError, match="there is no site 'hall 9'"):
         store.export("hall 9", tmp_path / "none")
