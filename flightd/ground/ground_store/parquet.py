@@ -116,11 +116,12 @@ def _convert(duckdb: Any, text: Path, parquet: Path, columns: dict[str, str]) ->
         for name, kind in columns.items()
     )
     types = ", ".join(f"'{name}': '{kind}'" for name, kind in read.items())
-    options = f"auto_detect = false, parallel = false, header = false, quote = '\"', escape = '\"', nullstr = '{_NONE}', columns = {{{types}}}"
+    form = "auto_detect = false, parallel = false, header = false, delim = ',', quote = '\"', escape = '\"'"
+    options = f"{form}, nullstr = '{_NONE}', columns = {{{types}}}"
     with duckdb.connect() as connection:
         try:
             connection.execute(
-                f"COPY (SELECT {chosen} FROM read_csv({_quoted(text)}, delim = ',', {options}))"
+                f"COPY (SELECT {chosen} FROM read_csv({_quoted(text)}, {options}))"
                 f" TO {_quoted(parquet)} (FORMAT parquet, COMPRESSION zstd)"
             )
         except duckdb.Error as err:
