@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,8 +16,10 @@ import pytest
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationState, Observation, Standing
 from flightd.core.types import CodeRead
-from flightd.ground.ground_store import events
+from flightd.ground.ground_store import events, migrations
 from flightd.ground.ground_store.batch import Batch, SentDecision, SentLook
+from flightd.ground.ground_store.engine import Engine
+from flightd.ground.ground_store.evidence import FolderEvidence
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.ground_store.webhooks import Webhook, signature
 
@@ -125,3 +128,16 @@ def test_what_nobody_takes_is_bounded_and_counted(
 def test_a_hook_that_others_could_read_or_forge_is_refused(url: str, secret: str, why: str) -> None:
     with pytest.raises(InputError, match=why):
         Webhook(url, secret)
+
+
+def test_a_store_from_before_webhooks_is_brought_up_to_date(
+    engine: Callable[[], Engine], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = migrations._files  # noqa: SLF001
+    with monkeypatch.context() as before:
+        before.setattr(migrations, "_files", lambda kind: known(kind)[:1])
+        GroundStore(engine(), FolderEvidence(tmp_path)).close()
+    with GroundStore(engine(), FolderEvidence(tmp_path)) as store:
+        assert store.waiting_events("https://wms.hall", 5) == ([], 0)
+        assert store.take(counted(1, "PAL-1")).new == 1
+        assert [one.kind for one in store.waiting_events("https://wms.hall", 5)[0]] == ["run.new"]
