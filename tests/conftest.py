@@ -42,6 +42,7 @@ _COSTLY = {
     "tests/web/test_navigation.py",
     "tests/web/test_studio_api.py",
 }
+_ON_ONE_DATABASE = "tests/unit/ground_store/"
 _IN_BROWSER = re.compile(r"tests/web/test_(?:\w*page|language)\.py")
 """Each starts a Chromium, and a station for all its tests."""
 _IN_CI = os.environ.get("CI", "") == "true"
@@ -76,6 +77,8 @@ class _CostlyTogether(LoadScopeScheduling):  # type: ignore[misc]  # its library
     """The tests of a module that share what took long to make stay on one worker; others go anywhere."""
 
     def _split_scope(self, nodeid: str) -> str:
+        if nodeid.startswith(_ON_ONE_DATABASE):
+            return _ON_ONE_DATABASE
         module = nodeid.partition("::")[0]
         return module if module in _COSTLY or _IN_BROWSER.fullmatch(module) else nodeid
 

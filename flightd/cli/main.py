@@ -21,6 +21,7 @@ from flightd.cli import (
     report,
     run,
     sim,
+    store,
     study,
     train_colour,
 )
@@ -31,7 +32,7 @@ from flightd.cli.exits import run_app
 app = application("flightd")
 for command in (
     detect, evaluate, codes, bench, train_colour, sim, calibrate, plan, run, ground, doctor, report, replay,
-    study, log, keygen, site_map, inventory, guide,
+    study, log, keygen, site_map, inventory, store, guide,
 ):  # fmt: skip
     command.register(app)
 

@@ -27,6 +27,7 @@ from flightd.ground.browser import Browser
 from flightd.ground.doctor.routes import doctor_routes
 from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.routes import flight_routes
+from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.guards import Guard, Hosts
 from flightd.ground.guide_pages.routes import guide_routes
 from flightd.ground.hub import Hub
@@ -49,6 +50,7 @@ from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.site_page.routes import site_page
 from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.stock_page import stock_page
+from flightd.ground.store_api.routes import store_routes
 from flightd.ground.studio.routes import studio_routes
 from flightd.ground.studio.studio import Studio
 
@@ -76,11 +78,12 @@ def application(
     simulated: SimulatedFlight | None = None,
     others: Sequence[ReadFolder] = (),
     managers: Managers | None = None,
+    store: GroundStore | None = None,
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
     `people` who sits at a page, inventories, site files and `flights` lie under `folder`, more inventories
     under the `others`, `uploads` reads what people send, `maps` lays out maps, `studio` and `simulated` are
-    None without a folder; `managers` fly drones, too."""
+    None without a folder; `managers` fly drones, too; programs ask the `store`."""
     orders = Orders(hub.drones, access)
     routes = [
         first_page(),
@@ -93,6 +96,7 @@ def application(
         *doctor_routes(hub.drones, access, None if studio is None else studio.shelf),
         *mission_routes(folder, hub.drones, hub.for_each, others),
         *manager_routes(managers),
+        *store_routes(store),
         *guide_routes(),
         *session_routes(access),
         Mount("/static", StaticFiles(directory=STATIC)),

@@ -21,6 +21,9 @@ from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.access.access import Access
 from flightd.ground.application import application
 from flightd.ground.flights.flights import Flights
+from flightd.ground.ground_store.feeder import Feeder
+from flightd.ground.ground_store.store import GroundStore
+from flightd.ground.ground_store.webhooks import Webhook
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
@@ -141,6 +144,8 @@ def run(
     viewers: Sequence[Viewer] = (),
     others: Sequence[ReadFolder] = (),
     fleet: FleetLink | None = None,
+    store: GroundStore | None = None,
+    hooks: Sequence[Webhook] = (),
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
     InputError where it must not be listened at (`check_reach`)."""
@@ -150,7 +155,20 @@ def run(
 
     async def until_signal() -> None:
         serving = asyncio.ensure_future(
-            serve(drones, listener, where, access, on_ready, certificate, folder, viewers, others, fleet)
+            serve(
+                drones,
+                listener,
+                where,
+                access,
+                on_ready,
+                certificate,
+                folder,
+                viewers,
+                others,
+                fleet,
+                store,
+                hooks,
+            )
         )
         end_on_signals(serving, came)
         with contextlib.suppress(asyncio.CancelledError):
@@ -172,10 +190,13 @@ async def serve(
     viewers: Sequence[Viewer] = (),
     others: Sequence[ReadFolder] = (),
     fleet: FleetLink | None = None,
+    store: GroundStore | None = None,
+    hooks: Sequence[Webhook] = (),
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
     end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are;
-    `fleet` has the drones flown by somebody else's manager."""
+    `fleet` has the drones flown by somebody else's manager; `store` is fed with what lies there, asked by
+    programs, and `hooks` are told of it."""
     viewers = viewers if fleet is None else (*viewers, fleet)
     hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
@@ -188,7 +209,19 @@ async def serve(
     server = _Server(
         uvicorn.Config(
             application(
-                hub, hosts, access, people, folder, flights, uploads, maps, studio, simulated, others, fleet
+                hub,
+                hosts,
+                access,
+                people,
+                folder,
+                flights,
+                uploads,
+                maps,
+                studio,
+                simulated,
+                others,
+                fleet,
+                store,
             ),
             http="h11",
             ws=PageSocket,
@@ -215,8 +248,14 @@ async def serve(
             tasks.create_task(studio.run(), name="studio")
         if simulated is not None:
             tasks.create_task(simulated.run(), name="simulated flight")
-        if access.login:
+        if store is not None:
+            feeder = Feeder(store, folder, others, access.state)
+            tasks.create_task(feeder.run(), name="ground store")
+            for hook in hooks:
+                tasks.create_task(hook.run(store), name="webhook")
+        if access.login or store is not None:  # keys are for this machine's programs, too
             tasks.create_task(access.run(), name="people")
+        if access.login:
             tasks.create_task(people.run(), name="people whose session is over")
         serving = tasks.create_task(server.serve([listener]), name="pages")
         try:

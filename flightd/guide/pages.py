@@ -18,6 +18,7 @@ TOPICS = (
     "cameras",
     "service",
     "ground-station",
+    "store",
     "exchange",
     "fleet",
     "ground-link",

@@ -18,6 +18,7 @@ from websockets.typing import Origin
 
 from flightd.adapters.ground_link.client import Address
 from flightd.ground.access.access import Access
+from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.hub import Viewer
 from flightd.ground.mqtt.fleet_link import FleetLink
 from flightd.ground.server import Listening, opened, serve
@@ -105,6 +106,7 @@ async def served(
     viewers: Sequence[Viewer] = (),
     send_buffer: int | None = None,
     fleet: FleetLink | None = None,
+    store: GroundStore | None = None,
 ) -> AsyncIterator[Station]:
     """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`; its system
     takes so many bytes at once for a page (None: as many as it likes)."""
@@ -124,6 +126,7 @@ async def served(
                 folder=folder,
                 viewers=viewers,
                 fleet=fleet,
+                store=store,
             )
         )
         try:

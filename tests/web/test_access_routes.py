@@ -22,6 +22,7 @@ from flightd.ground.access.roles import Role
 from flightd.ground.access.route_roles import RULES
 from flightd.ground.application import application
 from flightd.ground.flights.flights import Flights
+from flightd.ground.ground_store.open_store import opened_store
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub
 from flightd.ground.page_person import PagePeople
@@ -47,7 +48,7 @@ ANYBODYS = {
 def routes_of(tmp_path: Path) -> list[str]:
     """Every route of a station, as the rules name them."""
     access, flights = Access(tmp_path, login=False, secure=False), Flights(tmp_path)
-    hub = Hub([])
+    hub, store = Hub([]), opened_store(str(tmp_path / "store.db"))
     guard = application(
         hub,
         own_hosts("127.0.0.1", 1),
@@ -58,8 +59,10 @@ def routes_of(tmp_path: Path) -> list[str]:
         ReadingProcess(),
         ReadingProcess(),
         Studio(tmp_path, flights),
+        store=store,
     )
     access.close()
+    store.close()
     found: list[str] = []
     for route in guard._app._app.routes:  # type: ignore[attr-defined]  # noqa: SLF001
         kind = type(route).__name__
@@ -95,7 +98,8 @@ class Raw:
 @in_real_time
 async def test_nobody_who_has_not_signed_in_is_told_anything(tmp_path: Path) -> None:
     with_people(tmp_path)
-    async with served(NOBODY, folder=tmp_path, state=tmp_path, login=True) as station:
+    store = opened_store(str(tmp_path / "store.db"))
+    async with served(NOBODY, folder=tmp_path, state=tmp_path, login=True, store=store) as station:
         own = {"Origin": station.origin, **JSON}
         for of, rule in RULES.items():
             method, path = of.split(" ")

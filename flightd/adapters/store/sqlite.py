@@ -298,6 +298,13 @@ class SqliteStore:
             ],
         )
 
+    def forget(self, looks: Iterable[str]) -> None:
+        """Take looks out, by their ids: somebody else keeps them."""
+        rows = [(look,) for look in looks]
+        with self._transaction():
+            self._db.executemany("DELETE FROM code_read WHERE observation = ?", rows)
+            self._db.executemany("DELETE FROM observation WHERE id = ?", rows)
+
     def locations(self) -> list[LocationRecord]:
         """Every location by its code, with its newest confirmed observation (of equally new ones, the
         greatest id)."""

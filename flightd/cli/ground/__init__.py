@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from flightd.cli.ground import audit, people, serve
+from flightd.cli.ground import audit, keys, people, serve
 
 
 def register(app: typer.Typer) -> None:
@@ -13,6 +13,6 @@ def register(app: typer.Typer) -> None:
         invoke_without_command=True, no_args_is_help=False, rich_markup_mode=None, epilog=serve.EXAMPLES
     )
     commands.callback()(serve.ground)
-    for command in (people, audit):
+    for command in (people, keys, audit):
         command.register(commands)
     app.add_typer(commands, name="ground")

@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flightd.cli.ground.state import State, state_folder
+from flightd.cli.store.options import Pictures, opened
 from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import Address
     from flightd.ground.access.access import Access
     from flightd.ground.foxglove_view.live_server import FoxgloveServer
+    from flightd.ground.ground_store.webhooks import Webhook
     from flightd.ground.mqtt.fleet_link import FleetLink
     from flightd.ground.read_folders import ReadFolder
     from flightd.ground.server import Listening
@@ -34,6 +36,7 @@ EXAMPLES = """Examples:
   flightd ground --foxglove 127.0.0.1          for Foxglove, too: it connects to ws://127.0.0.1:8765
   flightd ground --mqtt mqtt://broker --mqtt-version 3.0    for a fleet's manager, by VDA 5050
   flightd ground --mqtt mqtt://broker --mqtt-orders         the manager flies them, as long as no person does
+  flightd ground --folder out --store counts.db             and the ground store, for programs
   flightd ground --listen 0.0.0.0:8443 --tls-cert station.pem --tls-key station.key    for others, who sign in
 """
 
@@ -131,6 +134,26 @@ def ground(
             help="A drone that holds without an order, or without the broker, flies home after so long.",
         ),
     ] = 60.0,
+    store: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE|URL",
+            envvar="FLIGHTD_STORE",
+            help="Feed the ground store with what lies in the folders, and let programs ask it: a file, or"
+            " postgresql://USER@HOST/DATABASE.",
+            show_default=False,
+        ),
+    ] = None,
+    evidence: Pictures = None,
+    webhook: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="URL",
+            help="Tell this address of new runs, differences and decisions in the store, several by several"
+            " options; signed with the secret in FLIGHTD_WEBHOOK_SECRET.",
+            show_default=False,
+        ),
+    ] = None,
     state: State = None,
 ) -> None:
     """Watch and command drones in the browser: map, cameras, hazards, events; start, pause, go to, STOP.
@@ -172,8 +195,20 @@ def ground(
         hold_s = mqtt_hold if mqtt_orders else None
         fleet = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones, access, hold_s)
         viewers = () if viewer is None else (viewer,)
+        hooks = _webhooks(webhook or (), store)
+        kept = None if store is None else stack.enter_context(opened(store, evidence))
         ended_by = run(
-            drones, where, partial(_say_where, at), access, certificate, folder, viewers, others, fleet
+            drones,
+            where,
+            partial(_say_where, at),
+            access,
+            certificate,
+            folder,
+            viewers,
+            others,
+            fleet,
+            kept,
+            hooks,
         )
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
@@ -192,6 +227,14 @@ def _others(folder: Path | None, flights: Sequence[Path]) -> tuple[ReadFolder, .
             what = "is no folder" if path.exists() else "there is no such folder yet"
             print(f"flightd: --flights {path}: {what}", file=sys.stderr)
     return read_folders(flights)
+
+
+def _webhooks(urls: Sequence[str], store: str | None) -> list[Webhook]:
+    from flightd.ground.ground_store.webhooks import SECRET, Webhook
+
+    if urls and store is None:
+        raise InputError("there is no store to tell of", key="--webhook", remedy="give --store FILE")
+    return [Webhook(url, os.environ.get(SECRET, "")) for url in urls]
 
 
 def _foxglove_server(address: str, login: bool, drones: Sequence[tuple[str, Address]]) -> FoxgloveServer:

@@ -18,6 +18,7 @@ from flightd.adapters.ground_link.audit import AuditLog
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.ground.access.attempts import Attempts
 from flightd.ground.access.audit import StationEntry, audit_file
+from flightd.ground.access.key_book import KeyBook, ScopedKey
 from flightd.ground.access.passwords import PasswordCheck, hashed_secret
 from flightd.ground.access.people_book import PeopleBook, Person, Session
 from flightd.ground.access.roles import Identity, Role
@@ -55,9 +56,11 @@ class Access:
         self.secure = secure
         """Under TLS: the cookie is for nobody else."""
         self._book = PeopleBook(state)
+        self._keys = KeyBook(state)
         self._now_s = now_s
         self._people: dict[str, Person] = {}
         self._by_key: dict[bytes, Person] = {}
+        self._scoped: dict[bytes, ScopedKey] = {}
         self._sessions: dict[bytes, Session] = {}
         self._seen: dict[bytes, float] = {}
         self._found_over: frozenset[bytes] = frozenset()
@@ -87,7 +90,7 @@ class Access:
         return sum(bool(person.password or person.key) for person in self._people.values())
 
     async def run(self) -> None:
-        """Follow what `flightd ground people` changes, until cancelled."""
+        """Follow what `flightd ground people` and `keys` change, until cancelled."""
         noted_s = self._now_s()
         try:
             while True:
@@ -216,7 +219,11 @@ class Access:
     def _by_bearer(self, authorization: str) -> Identity:
         kind, _, key = authorization.partition(" ")
         hashed = hashed_secret(key.strip())
-        person = self._by_key.get(hashed) if kind.lower() == "bearer" and key.strip() else None
+        if kind.lower() != "bearer" or not key.strip():
+            raise WrongKeyError("this key is nobody's here")
+        if (scoped := self._scoped.get(hashed)) is not None:
+            return Identity(scoped.name, Role.VIEWER, "key", hashed, frozenset(scoped.scopes))
+        person = self._by_key.get(hashed)
         if person is None:
             raise WrongKeyError("this key is nobody's here")
         return Identity(person.name, person.role, "key", hashed)
@@ -244,6 +251,8 @@ class Access:
     def _read(self) -> None:
         """Everybody anew, at one stroke for the loop."""
         people, sessions = self._book.read()
+        keys = self._keys.all()
+        self._scoped = {key.hash: key for key in keys}
         self._people = {person.name.casefold(): person for person in people}
         self._by_key = {person.key: person for person in people if person.key}
         self._sessions = {session.id: session for session in sessions}

@@ -37,12 +37,17 @@ def audit_file(state: Path) -> Path:
     return state / FILE
 
 
+def audit_files(state: Path) -> tuple[Path, Path]:
+    """The lines that were put aside, and those since; either may not be there."""
+    file = audit_file(state)
+    return file.with_name(f"{FILE}.1"), file
+
+
 def newest_entries(state: Path, most: int, person: str = "") -> list[dict[str, Any]]:
     """The newest lines, oldest first, of one person or of all; what is no line is left out.
     UnavailableError where they cannot be read."""
     kept: deque[dict[str, Any]] = deque(maxlen=most)
-    file = audit_file(state)
-    for path in (file.with_name(f"{FILE}.1"), file):
+    for path in audit_files(state):
         try:
             kept.extend(
                 entry

@@ -107,8 +107,7 @@ class _Gate:
             if who is None:
                 await (_turn_away(receive, send) if is_socket else _ask_who(scope, receive, send))
                 return
-            if not who.role.covers(rule.role):
-                why = f"this needs the role {rule.role}; {who.name} has the role {who.role}"
+            if why := _lacks(who, rule):
                 if rule.line is not Line.NONE:
                     self._write_down(scope, who, "refused", why)
                 await _refuse(scope, receive, send, 403, why)
@@ -136,6 +135,18 @@ class _Gate:
         self._access.write_down(
             who, address_of(scope), method, scope["path"][:200], outcome=outcome, text=notes[:500]
         )
+
+
+def _lacks(who: Identity, rule: Rule) -> str:
+    """What is missing to somebody, as a line; "" where he may."""
+    if who.scopes is not None:
+        if rule.scope in who.scopes:
+            return ""
+        needed = "is not for keys with scopes" if rule.scope is None else f"needs the scope {rule.scope}"
+        return f"this {needed}; {who.name} has {', '.join(sorted(who.scopes))}"
+    if rule.role is not None and not who.role.covers(rule.role):
+        return f"this needs the role {rule.role}; {who.name} has the role {who.role}"
+    return ""
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: str) -> None:

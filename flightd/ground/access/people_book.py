@@ -35,6 +35,11 @@ CREATE TABLE session (
 """
 
 
+def is_name(text: str) -> bool:
+    """Whether a person or a program can be called that."""
+    return _NAME.fullmatch(text) is not None
+
+
 @dataclass(frozen=True, slots=True)
 class Person:
     """Somebody, or a program; `password` and `key` are hashes, empty where there is none."""
@@ -90,7 +95,7 @@ class PeopleBook:
 
     def add(self, person: Person) -> None:
         """InputError for a name that is taken, or none."""
-        if _NAME.fullmatch(person.name) is None:
+        if not is_name(person.name):
             raise InputError(
                 f"{person.name!r} is no name here",
                 remedy="take up to 60 letters and digits, with . _ @ - between them",

@@ -39,12 +39,14 @@ begins again.  Pause is among them so that a viewer's only way is not the hardes
 @dataclass(frozen=True, slots=True)
 class Identity:
     """Who asks: by a password (`session` is the hash of its id), by a key, from this machine, or over a
-    fleet's broker."""
+    fleet's broker.  With `scopes` (words of `key_book`) it is a program that may what these say and nothing
+    else, whatever the role."""
 
     name: str
     role: Role
     by: Literal["local", "password", "key", "mqtt"]
     session: bytes = b""
+    scopes: frozenset[str] | None = None
 
 
 def may_order(role: Role, command: CommandKind) -> bool:

@@ -9,6 +9,7 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from flightd.ground.access.key_book import Scope
 from flightd.ground.access.roles import Role
 
 
@@ -25,10 +26,12 @@ class Line(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """`role` None: anybody, without signing in; nothing that is anybody's business may be behind it."""
+    """`role` None: anybody, without signing in; nothing that is anybody's business may be behind it.  A key
+    with scopes needs the `scope`, and may nothing where there is none."""
 
     role: Role | None
     line: Line
+    scope: Scope | None = None
 
 
 _ANYBODY = Rule(None, Line.NONE)
@@ -36,6 +39,8 @@ _LOOKS = Rule(Role.VIEWER, Line.NONE)
 _ACTS = Rule(Role.OPERATOR, Line.ACT)
 _RULES_OVER_ALL = Rule(Role.ADMIN, Line.NONE)
 _CHANGES = Rule(Role.ADMIN, Line.ACT)
+_READS_STORE = Rule(Role.VIEWER, Line.NONE, Scope.STOCK)
+_DELIVERS = Rule(Role.OPERATOR, Line.OWN, Scope.DELIVER)
 
 RULES: Mapping[str, Rule] = {
     # the pages' document and files, which are the same for all, and the way in
@@ -127,4 +132,19 @@ RULES: Mapping[str, Rule] = {
     "GET /api/guide/pages/{topic}": _LOOKS,
     "MOUNT /api/guide/pictures": _LOOKS,
     "GET /api/audit": _RULES_OVER_ALL,
+    # the ground store, for programs
+    "GET /api/v1/openapi.json": _READS_STORE,
+    "GET /api/v1/sites": _READS_STORE,
+    "GET /api/v1/stock": _READS_STORE,
+    "GET /api/v1/history": _READS_STORE,
+    "GET /api/v1/runs": _READS_STORE,
+    "GET /api/v1/differences": _READS_STORE,
+    "GET /api/v1/observations": _READS_STORE,
+    "GET /api/v1/flights": _READS_STORE,
+    "GET /api/v1/decisions": _READS_STORE,
+    "GET /api/v1/pictures/{name}": Rule(Role.VIEWER, Line.NONE, Scope.PICTURES),
+    "POST /api/v1/deliveries": _DELIVERS,  # the store's own books have each
+    "POST /api/v1/deliveries/standings": _DELIVERS,
+    "POST /api/v1/deliveries/missing-pictures": _DELIVERS,
+    "POST /api/v1/deliveries/pictures": _DELIVERS,
 }

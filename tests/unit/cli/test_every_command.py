@@ -37,6 +37,9 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd ground people password": ("nobody",),
     "flightd ground people key": ("nobody",),
     "flightd ground people remove": ("nobody",),
+    "flightd ground keys make": ("wms", "--scope", "everything"),
+    "flightd ground keys list": ("surplus",),
+    "flightd ground keys revoke": ("nobody",),
     "flightd ground audit": ("--last", "0"),
     "flightd doctor": ("--config", "none.toml"),
     "flightd report": ("empty.mcap",),
@@ -58,6 +61,10 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd inventory export": ("none", "--out", "x.pdf"),
     "flightd inventory compare": ("none", "none.csv"),
     "flightd inventory merge": ("stock", "none"),
+    "flightd store deliver": (".", "--store", "http://ground.hall"),
+    "flightd store prune": (".", "--store", "none://x"),
+    "flightd store show": ("--store", "."),
+    "flightd store export": ("--store", "empty.mcap", "--out", "x.parquet"),
     "flightctl keygen": ("ann", "--role", "captain"),
     "flightctl protocol": ("--json", "surplus"),
     "flightctl goto": ("A2",),
@@ -84,7 +91,10 @@ COMMANDS = dict(
         *_walk(typer.main.get_command(flightctl_app), "flightctl"),
     ]
 )
-GROUPS = ("flightd", "flightctl", "flightd log", "flightd map", "flightd inventory", "flightd ground people")
+GROUPS = (
+    "flightd", "flightctl", "flightd log", "flightd map", "flightd inventory", "flightd ground people",
+    "flightd ground keys", "flightd store",
+)  # fmt: skip
 
 Run = Callable[..., tuple[int, str, str]]
 

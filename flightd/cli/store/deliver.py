@@ -1,0 +1,92 @@
+"""`flightd store deliver` and `prune`: from a drone's folders into the store, and away from there."""
+
+from __future__ import annotations
+
+import json
+import platform
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flightd.cli.options import AsJson
+from flightd.cli.store.options import Pictures, StoreOrStation, target
+
+
+def register(app: typer.Typer) -> None:
+    """Hang the commands under `app`."""
+    app.command("deliver")(deliver)
+    app.command("prune")(prune)
+
+
+def deliver(
+    paths: Annotated[
+        list[Path],
+        typer.Argument(metavar="PATH…", exists=True, help="Folders, an inventory.db, or flight logs."),
+    ],
+    store: StoreOrStation,
+    evidence: Pictures = None,
+    site: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="Of which site it is.  Default: that of the flight log beside it."),
+    ] = "",
+    source: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="Who delivers, for the store's books.  Default: this machine."),
+    ] = "",
+    as_json: AsJson = False,
+) -> None:
+    """Deliver inventories with their pictures, flights, and decisions to the store.
+
+    What is told to be delivered is on the store's disk.  However often it is cut and begun again, nothing is
+    lost and nothing is there twice.  The folders are only read.
+
+    \b
+    Examples:
+      flightd store deliver out --store counts.db
+      flightd store deliver /var/lib/flightd --store postgresql://flightd@db/counts --evidence /srv/evidence
+      FLIGHTD_STORE_KEY=… flightd store deliver /var/lib/flightd --store https://ground.hall:8443
+    """
+    with target(store, evidence) as into:
+        from flightd.ground.ground_store.deliver_folder import deliver_path
+        from flightd.ground.ground_store.sender import Delivered
+
+        done = Delivered()
+        for path in paths:
+            deliver_path(path, site, source or platform.node(), into, done)
+    if as_json:
+        print(json.dumps(asdict(done)))
+        return
+    print(
+        f"{done.looks} looks delivered, {done.changed} changed, {done.already} were there already; "
+        f"{done.pictures} pictures, {done.flights} flights, {done.decisions} decisions"
+    )
+
+
+def prune(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", exists=True, file_okay=False, help="Folder of an inventory.")
+    ],
+    store: StoreOrStation,
+    evidence: Pictures = None,
+    as_json: AsJson = False,
+) -> None:
+    """Take away what the store has of an inventory's older runs: looks, and their pictures.
+
+    The newest run stays whole, and so does each place's newest look: the inventory says the same as before.
+    The store is asked for each look and each picture; what it has not stays.
+
+    \b
+    Examples:
+      flightd store prune /var/lib/flightd/inventory --store counts.db
+    """
+    with target(store, evidence) as into:
+        from flightd.ground.ground_store.prune import prune as prune_folder
+
+        pruned = prune_folder(folder, into)
+    if as_json:
+        print(json.dumps(asdict(pruned)))
+        return
+    kept = f"; {pruned.stay} older looks are not in the store and stay" if pruned.stay else ""
+    print(f"{pruned.looks} looks and {pruned.pictures} pictures taken away{kept}")

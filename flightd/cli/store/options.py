@@ -1,0 +1,70 @@
+"""Which store a command is about."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeAlias
+
+import typer
+
+if TYPE_CHECKING:
+    from flightd.ground.ground_store.sender import Target
+    from flightd.ground.ground_store.store import GroundStore
+
+Store: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        metavar="FILE|URL",
+        envvar="FLIGHTD_STORE",
+        help="The store: a file, made where it is not there, or postgresql://USER@HOST/DATABASE.",
+        show_default=False,
+    ),
+]
+Pictures: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--evidence",
+        metavar="DIR",
+        help="Where the store's pictures lie.  Default: FILE-evidence; in PostgreSQL there is none.",
+        show_default=False,
+    ),
+]
+
+
+StoreOrStation: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--store",
+        metavar="FILE|URL",
+        envvar="FLIGHTD_STORE",
+        help="The store: a file, made where it is not there, postgresql://USER@HOST/DATABASE, or the station"
+        " that has it, https://HOST:PORT, with a key in FLIGHTD_STORE_KEY.",
+        show_default=False,
+    ),
+]
+
+
+@contextmanager
+def target(store: str, evidence: Path | None) -> Iterator[Target]:
+    """A store that is opened meanwhile, or a station.  Errors as `opened` and `StationTarget`."""
+    if store.startswith(("http://", "https://")):
+        from flightd.ground.ground_store.station_target import StationTarget
+
+        yield StationTarget(store, os.environ.get("FLIGHTD_STORE_KEY", ""))
+        return
+    with opened(store, evidence) as found:
+        yield found
+
+
+def opened(store: str, evidence: Path | None) -> GroundStore:
+    """InputError, UnavailableError as `opened_store`."""
+    try:
+        from flightd.ground.ground_store.open_store import opened_store
+    except ModuleNotFoundError:
+        from flightd.core.extras import missing_extra
+
+        raise missing_extra("ground", "flightd store") from None
+    return opened_store(store, evidence)

@@ -1,0 +1,148 @@
+"""What is delivered to the store: batches, the same whenever they are made of the same."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from flightd.core.errors import InputError
+from flightd.core.inventory import Observation, PlannedLocation, Standing
+
+MOST_LOOKS = 500
+"""In one batch."""
+
+
+@dataclass(frozen=True, slots=True)
+class SentLook:
+    """A look and how it stands at its sender."""
+
+    observation: Observation
+    standing: Standing
+
+
+@dataclass(frozen=True, slots=True)
+class SentFlight:
+    """A flight that is over; `id` is the SHA-256 of the beginning of its log."""
+
+    id: str
+    drone: str
+    began_ns: int
+    duration_s: float | None
+    mission: str
+    outcome: str
+    reason: str
+    verdict: str
+    nodes_planned: int | None
+    nodes_visited: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class SentDecision:
+    """What a person decided about a place."""
+
+    id: str
+    place: str
+    utc_ns: int
+    seen_ns: int
+    what: str
+    who: str
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class SentPerson:
+    """Somebody whom a station knows, without password and key."""
+
+    name: str
+    role: str
+    seen_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class SentLine:
+    """A line of a station's audit, as it was written."""
+
+    utc_ns: int
+    person: str
+    act: str
+    target: str
+    outcome: str
+    line: str
+
+    @property
+    def id(self) -> bytes:
+        return hashlib.sha256(self.line.encode()).digest()
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """All of one `site` ("" where it says nothing of one); `source` is who sends it, for people."""
+
+    site: str
+    source: str
+    places: tuple[PlannedLocation, ...] = ()
+    looks: tuple[SentLook, ...] = ()
+    flights: tuple[SentFlight, ...] = ()
+    decisions: tuple[SentDecision, ...] = ()
+    people: tuple[SentPerson, ...] = ()
+    audit: tuple[SentLine, ...] = ()
+
+    @property
+    def id(self) -> bytes:
+        """The same for the same content, whoever sends it."""
+        digest = hashlib.sha256(self.site.encode("utf-8", "surrogatepass"))
+        for part in (self.places, self.flights, self.decisions, self.people, self.audit):
+            digest.update(repr(part).encode("utf-8", "surrogatepass"))
+        for look in self.looks:
+            digest.update(f"{look.observation.id}{look.standing:d}".encode())
+        return digest.digest()
+
+    def check(self) -> None:
+        """InputError for what no database keeps: names with NUL or half a character in them, looks without a
+        site, and too much at once."""
+        if len(self.looks) > MOST_LOOKS:
+            raise InputError(f"a batch of {len(self.looks)} looks", remedy=f"send at most {MOST_LOOKS}")
+        if not self.site and (self.places or self.looks or self.flights or self.decisions):
+            raise InputError("of no site", file=self.source, remedy="say which: --site NAME")
+        for look in self.looks:
+            if not 0 <= look.observation.utc_ns < 1 << 63:
+                raise InputError(f"{look.observation.location}: a look at no time", file=self.source)
+        for text in self._texts():
+            if "\0" in text or not _is_text(text):
+                raise InputError(f"the name {text!r} is no text", file=self.source)
+
+    def _texts(self) -> Iterator[str]:
+        yield self.site
+        yield self.source
+        for place in self.places:
+            yield from (place.code, place.node)
+        for look in self.looks:
+            pose = look.observation.pose
+            yield from (look.observation.run, look.observation.location, pose.node if pose else "")
+        for flight in self.flights:
+            yield from (flight.drone, flight.mission, flight.outcome, flight.reason, flight.verdict)
+        for decision in self.decisions:
+            yield from (decision.id, decision.place, decision.who, decision.note)
+        for line in self.audit:
+            yield from (line.person, line.act, line.target, line.outcome, line.line)
+
+
+@dataclass(frozen=True, slots=True)
+class Receipt:
+    """What is in the store now, through to its disk: `new` looks, `changed` in their standing, and those that
+    it had `already`.  `store` is the store's own id."""
+
+    store: str
+    batch: str
+    new: int
+    changed: int
+    already: int
+
+
+def _is_text(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -1,0 +1,63 @@
+"""A few connections to a database, handed out and taken back."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Generic, Protocol, TypeVar
+
+from flightd.core.errors import UnavailableError
+
+
+class _Closable(Protocol):
+    def close(self) -> None: ...
+
+
+C = TypeVar("C", bound=_Closable)
+
+
+class Connections(Generic[C]):
+    """At most `most` at a time, made by `connect` as they are needed; who comes on top waits."""
+
+    def __init__(self, connect: Callable[[], C], most: int, wait_s: float) -> None:
+        self._connect = connect
+        self._wait_s = wait_s
+        self._room = threading.BoundedSemaphore(most)
+        self._lock = threading.Lock()
+        self._idle: list[C] = []
+        self._closed = False
+
+    @contextmanager
+    def one(self) -> Iterator[C]:
+        """A connection meanwhile, closed where the block raises: nobody knows what state it is in.
+        UnavailableError where none gets free."""
+        if not self._room.acquire(timeout=self._wait_s):
+            raise UnavailableError("too many questions to the store wait already", remedy="try again")
+        try:
+            with self._lock:
+                connection = self._idle.pop() if self._idle else None
+            if connection is None:
+                connection = self._connect()
+            try:
+                yield connection
+            except BaseException:
+                connection.close()
+                raise
+            self._take_back(connection)
+        finally:
+            self._room.release()
+
+    def close(self) -> None:
+        """Close those that are idle; others when they come back."""
+        with self._lock:
+            self._closed, idle, self._idle = True, self._idle, []
+        for connection in idle:
+            connection.close()
+
+    def _take_back(self, connection: C) -> None:
+        with self._lock:
+            if not self._closed:
+                self._idle.append(connection)
+                return
+        connection.close()

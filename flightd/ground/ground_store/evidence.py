@@ -1,0 +1,70 @@
+"""The pictures of a store: files named by the SHA-256 of what is in them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from flightd.adapters.store.evidence_pictures import EvidenceFolder
+from flightd.core.errors import InputError
+from flightd.ground.plain_files import plain_file
+from flightd.vision.shelf.evidence_jpeg import MOST_BYTES
+
+
+class Evidence(Protocol):
+    """Where pictures are.  UnavailableError where they cannot be kept."""
+
+    def has(self, name: str) -> bool:
+        """Whether it is there."""
+        ...
+
+    def keep(self, jpeg: bytes) -> str:
+        """Keep a picture, through to the disk; its name."""
+        ...
+
+    def picture(self, name: str) -> bytes:
+        """InputError where it is not there."""
+        ...
+
+
+class FolderEvidence:
+    """In a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = EvidenceFolder(folder)
+
+    def has(self, name: str) -> bool:
+        return self._folder.path(checked(name)).is_file()
+
+    def keep(self, jpeg: bytes) -> str:
+        return self._folder.keep(jpeg)
+
+    def picture(self, name: str) -> bytes:
+        jpeg = plain_file(self._folder.path(checked(name)), MOST_BYTES)
+        if jpeg is None:
+            raise InputError("this picture was not kept")
+        return jpeg
+
+
+class NoEvidence:
+    """Where nobody said where pictures are to lie: fine as long as there are none."""
+
+    def has(self, name: str) -> bool:
+        raise _untold(f"picture {name}")
+
+    def keep(self, jpeg: bytes) -> str:
+        raise _untold(f"a picture of {len(jpeg)} bytes")
+
+    def picture(self, name: str) -> bytes:
+        raise _untold(f"picture {name}")
+
+
+def _untold(what: str) -> InputError:
+    return InputError(f"{what}: the store has no place for it", remedy="say where: --evidence DIR")
+
+
+def checked(name: str) -> str:
+    """The name of a picture.  InputError for another."""
+    if len(name) != 64 or not set(name) <= set("0123456789abcdef"):
+        raise InputError("not the name of a picture")
+    return name

@@ -1,0 +1,168 @@
+"""The station feeds its store: what comes to lie in its folders, and what its people decide and do."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import platform
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from flightd.core.errors import FlightdError
+from flightd.ground.access.audit import audit_files
+from flightd.ground.access.people_book import PeopleBook
+from flightd.ground.decision_book import Decision, DecisionBook
+from flightd.ground.flights.log_folder import find_logs
+from flightd.ground.ground_store.batch import MOST_LOOKS, Batch, SentLine, SentPerson
+from flightd.ground.ground_store.sender import (
+    Delivered,
+    deliver_decisions,
+    deliver_flights,
+    deliver_inventory,
+)
+from flightd.ground.ground_store.store import GroundStore
+from flightd.ground.read_folders import ReadFolder
+from flightd.ground.stores import Stores
+
+_LOG = logging.getLogger(__name__)
+_EACH_S = 10.0
+_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """Something that is delivered again whenever its `stamp` is another."""
+
+    name: str
+    stamp: object
+    deliver: Callable[[], None]
+
+
+class Feeder:
+    """Delivers to `store` what lies under `folder` and the `others`, and of the station's `state` people and
+    audit.  What cannot be delivered is said once, and tried again when it has changed."""
+
+    def __init__(
+        self, store: GroundStore, folder: Path | None, others: Sequence[ReadFolder], state: Path
+    ) -> None:
+        self._store = store
+        self._folder = folder
+        self._stores = Stores(folder, others)
+        self._others = others
+        self._state = state
+        self._source = platform.node()
+        self._done: dict[str, object] = {}
+        self._failures: dict[str, str] = {}
+        self._read: dict[int, int] = {}
+        """By inode how much of the audit was delivered since the station began; again is harmless."""
+        self._turn = threading.Lock()
+        self._ending = False
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        try:
+            while True:
+                await asyncio.to_thread(self.feed)
+                await asyncio.sleep(_EACH_S)
+        finally:
+            self._ending = True
+
+    def feed(self) -> None:
+        """Deliver what has changed."""
+        with self._turn:
+            for kind in (self._inventories, self._flights, self._people, self._audit):
+                with self._failure_told(kind.__name__.strip("_")):
+                    for part in kind():
+                        if not self._ending and self._done.get(part.name) != part.stamp:
+                            with self._failure_told(part.name):
+                                part.deliver()
+                                self._done[part.name] = part.stamp
+
+    @contextmanager
+    def _failure_told(self, what: str) -> Iterator[None]:
+        """In the log, once for each that is another."""
+        try:
+            yield
+        except (FlightdError, OSError) as err:
+            if self._failures.get(what) != str(err):
+                _LOG.warning("%s: not in the ground store: %s", what, err)
+            self._failures[what] = str(err)
+        else:
+            self._failures.pop(what, None)
+
+    def _inventories(self) -> Iterator[_Part]:
+        book = None if self._folder is None else DecisionBook(self._folder)
+        for name, written_ns in self._stores.names():
+            site = self._stores.site_name(name)
+            decisions = [] if book is None else book.decisions(name)
+            if site:  # else no flight log says yet where it was counted
+                deliver = partial(self._deliver_inventory, name, site, decisions)
+                yield _Part(f"inventory {name}", (written_ns, len(decisions), site), deliver)
+
+    def _deliver_inventory(self, name: str, site: str, decisions: Sequence[Decision]) -> None:
+        done = Delivered()
+        deliver_inventory(self._stores.folder(name), site, self._source, self._store, done)
+        deliver_decisions(decisions, site, self._source, self._store, done)
+
+    def _flights(self) -> Iterator[_Part]:
+        if self._folder is not None:
+            for log in find_logs(self._folder, self._others).logs:
+                deliver = partial(deliver_flights, [log], "", self._source, self._store, Delivered())
+                yield _Part(f"flight {log.shown_path}", log.stamp, deliver)
+
+    def _people(self) -> Iterator[_Part]:
+        people = PeopleBook(self._state).people()
+
+        def deliver() -> None:
+            sent = tuple(SentPerson(person.name, person.role.value, time.time_ns()) for person in people)
+            self._store.take(Batch("", self._source, people=sent))
+
+        yield _Part("people", tuple((person.name, person.role) for person in people), deliver)
+
+    def _audit(self) -> Iterator[_Part]:
+        for file in audit_files(self._state):
+            try:
+                stamp = file.stat()
+            except FileNotFoundError:
+                continue
+            deliver = partial(self._deliver_audit, file, stamp.st_ino)
+            yield _Part(f"audit {file.name}", (stamp.st_ino, stamp.st_size), deliver)
+
+    def _deliver_audit(self, file: Path, inode: int) -> None:
+        """What was added since it was delivered last, in whole lines; a file keeps its inode when it is put
+        aside."""
+        with file.open("rb") as lines:
+            lines.seek(self._read.get(inode, 0))
+            while part := list(islice(lines, MOST_LOOKS)):
+                whole = [line for line in part if line.endswith(b"\n")]
+                sent = [_sent_line(line.decode(errors="replace").rstrip("\n")) for line in whole]
+                self._store.take(Batch("", self._source, audit=tuple(sent)))
+                self._read[inode] = self._read.get(inode, 0) + sum(map(len, whole))
+
+
+def _sent_line(line: str) -> SentLine:
+    try:
+        entry = msgspec.json.decode(line, type=dict[str, Any])
+    except msgspec.DecodeError:
+        entry = {}  # a power cut in the middle of it
+
+    def field(name: str) -> str:
+        return str(entry.get(name, "")).replace("\0", "\N{REPLACEMENT CHARACTER}")
+
+    try:
+        utc_ns = max(round(datetime.fromisoformat(field("time")).timestamp() * _NS), 0)
+    except ValueError:
+        utc_ns = 0
+    return SentLine(
+        utc_ns, field("person"), field("act"), field("target"), field("outcome"), line.replace("\0", "")
+    )

@@ -1,0 +1,85 @@
+"""The store of a ground station, from elsewhere: drones deliver over HTTPS, by keys of scope `deliver`."""
+
+from __future__ import annotations
+
+import urllib.error
+import urllib.request
+from collections.abc import Sequence
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
+
+import msgspec
+
+from flightd.config.ground import is_loopback
+from flightd.core.errors import InputError, UnavailableError
+from flightd.ground.ground_store.batch import Batch, Receipt
+
+_WAIT_S = 30.0
+_MOST_ANSWER_BYTES = 1 << 20
+_T = TypeVar("_T")
+
+
+class StationTarget:
+    """A `Target` at `https://HOST:PORT`; certificates are checked as the system has it.
+
+    UnavailableError where the station cannot be had, InputError for what it refuses."""
+
+    def __init__(self, url: str, key: str) -> None:
+        """InputError for an address that would send the key in the open, and without a key."""
+        parts = urlsplit(url)
+        if parts.scheme not in {"http", "https"} or not parts.hostname or parts.path not in {"", "/"}:
+            raise InputError("not a station", key=f"--store {url}", remedy="give https://HOST:PORT")
+        if parts.scheme == "http" and not is_loopback(parts.hostname):
+            raise InputError("the key would be read on the way", key=f"--store {url}", remedy="give https://")
+        if not key:
+            raise InputError(
+                "a station asks for a key",
+                key="FLIGHTD_STORE_KEY",
+                remedy="set it to one of: flightd ground keys make NAME --scope deliver",
+            )
+        self.shown = url.rstrip("/")
+        self._key = key
+        self._opener = urllib.request.build_opener(urllib.request.ProxyHandler({}), NoRedirect())
+
+    def standings(self, looks: Sequence[str]) -> dict[str, int]:
+        return self._ask("/standings", msgspec.json.encode({"names": looks}), dict[str, int])
+
+    def missing_pictures(self, names: Sequence[str]) -> set[str]:
+        return self._ask("/missing-pictures", msgspec.json.encode({"names": names}), set[str])
+
+    def keep_picture(self, jpeg: bytes) -> str:
+        return self._ask("/pictures", jpeg, dict[str, str], "image/jpeg").get("name", "")
+
+    def take(self, batch: Batch) -> Receipt:
+        return self._ask("", msgspec.json.encode(batch), Receipt)
+
+    def _ask(self, way: str, body: bytes, kind: type[_T], content: str = "application/json") -> _T:
+        request = urllib.request.Request(  # noqa: S310 - http and https alone
+            f"{self.shown}/api/v1/deliveries{way}",
+            body,
+            {"Authorization": f"Bearer {self._key}", "Content-Type": content},
+        )
+        try:
+            with self._opener.open(request, timeout=_WAIT_S) as answer:
+                return msgspec.json.decode(answer.read(_MOST_ANSWER_BYTES), type=kind)
+        except urllib.error.HTTPError as err:
+            why = _refusal(err)
+            refused = UnavailableError if err.code >= 500 else InputError
+            raise refused(f"the station answers: {why}", file=self.shown) from None
+        except (OSError, msgspec.DecodeError) as err:
+            reason = getattr(err, "reason", None) or err
+            raise UnavailableError(f"the station cannot be had: {reason}", file=self.shown) from None
+
+
+class NoRedirect(urllib.request.HTTPRedirectHandler):
+    """What is sent goes to whom was named and to nobody else."""
+
+    def redirect_request(self, *_: Any) -> None:
+        return None
+
+
+def _refusal(err: urllib.error.HTTPError) -> str:
+    try:
+        return str(msgspec.json.decode(err.read(_MOST_ANSWER_BYTES), type=dict[str, Any])["refused"])
+    except (OSError, KeyError, msgspec.DecodeError):
+        return f"HTTP {err.code}"

@@ -1,0 +1,173 @@
+"""The ground store itself: takes batches once, however often they come, and answers in pages."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Self
+
+from flightd.core.errors import InputError
+from flightd.core.inventory import LocationState
+from flightd.ground.ground_store import events, pages
+from flightd.ground.ground_store.batch import Batch, Receipt
+from flightd.ground.ground_store.engine import Engine, Session, listed
+from flightd.ground.ground_store.events import Event
+from flightd.ground.ground_store.evidence import Evidence
+from flightd.ground.ground_store.migrations import brought_up
+from flightd.ground.ground_store.pages import MOST_ROWS, Mark
+from flightd.ground.ground_store.parquet import export
+from flightd.ground.ground_store.take_batch import Taken, take_batch
+
+
+class GroundStore:
+    """A store behind either engine, with its pictures.  Safe from any thread.
+
+    UnavailableError where the database cannot be had, InputError for what is asked wrongly."""
+
+    def __init__(self, engine: Engine, evidence: Evidence, utc_ns: Callable[[], int] = time.time_ns) -> None:
+        """Made, or brought up to date.  InputError for one of a newer flightd."""
+        self._engine = engine
+        self._utc_ns = utc_ns
+        self.evidence = evidence
+        try:
+            self.id = brought_up(engine)
+        except BaseException:
+            engine.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """What was taken stays."""
+        self._engine.close()
+
+    @property
+    def shown(self) -> str:
+        """Where it is, for people."""
+        return self._engine.shown
+
+    def take(self, batch: Batch) -> Receipt:
+        """Keep a batch.  When this returns, all of it is on the store's disk; where it raises, perhaps so:
+        the same batch again changes nothing."""
+        batch.check()
+        identity = batch.id
+        with self._engine.writing() as session:
+            if session.rows("SELECT 1 FROM delivery WHERE id = ?", identity):
+                taken = Taken()
+            else:
+                taken = take_batch(self._engine, session, batch, self._utc_ns())
+                session.run(
+                    "INSERT INTO delivery VALUES (?, ?, ?, ?)",
+                    identity,
+                    batch.source,
+                    self._utc_ns(),
+                    len(batch.looks),
+                )
+        already = len(batch.looks) - taken.new - taken.changed
+        return Receipt(self.id, identity.hex(), taken.new, taken.changed, already)
+
+    def standings(self, looks: Sequence[str]) -> dict[str, int]:
+        """Of these looks by id, those that the store has, each with its standing there."""
+        kept: dict[str, int] = {}
+        with self._engine.reading() as session:
+            for marks, part in listed([bytes.fromhex(look) for look in looks]):
+                rows = session.rows(f"SELECT id, standing FROM observation WHERE id IN {marks}", *part)
+                kept |= {identity.hex(): standing for identity, standing in rows}
+        return kept
+
+    def missing_pictures(self, names: Sequence[str]) -> set[str]:
+        """Those that the store has not.  InputError for what names no picture."""
+        return {name for name in names if not self.evidence.has(name)}
+
+    def keep_picture(self, jpeg: bytes) -> str:
+        """Keep a picture, through to the disk; its name."""
+        return self.evidence.keep(jpeg)
+
+    def waiting_events(self, hook: str, most: int) -> tuple[list[Event], int]:
+        """As `events.waiting`, of a hook that is known from now on."""
+        with self._engine.writing() as session:
+            events.register(session, hook)
+            return events.waiting(session, hook, most)
+
+    def event_taken(self, hook: str, event: int) -> None:
+        """As `events.taken`."""
+        with self._engine.writing() as session:
+            events.taken(session, hook, event)
+
+    def counts(self) -> dict[str, int]:
+        """How much the store holds."""
+        with self._engine.reading() as session:
+            return {
+                "sites": session.rows("SELECT count(*) FROM site")[0][0],
+                "places": session.rows("SELECT count(*) FROM place")[0][0],
+                "runs": session.rows("SELECT count(*) FROM run")[0][0],
+                "looks": int(session.rows("SELECT coalesce(sum(looks), 0) FROM run")[0][0]),
+                "flights": session.rows("SELECT count(*) FROM flight")[0][0],
+                "decisions": session.rows("SELECT count(*) FROM decision")[0][0],
+                "audit": session.rows("SELECT count(*) FROM audit")[0][0],
+            }
+
+    def export(self, site: str, folder: Path) -> dict[str, int]:
+        """As `parquet.export`."""
+        return export(self._engine, site, folder)
+
+    def sites(self) -> list[dict[str, Any]]:
+        """As `pages.sites`."""
+        with self._engine.reading() as session:
+            return pages.sites(session)
+
+    def stock(
+        self, site: str, after: str = "", limit: int = MOST_ROWS, state: LocationState | None = None
+    ) -> list[dict[str, Any]]:
+        """As `pages.stock`."""
+        with self._asked(site, limit) as (session, number):
+            return pages.stock(session, number, after, limit, state)
+
+    def history(
+        self, site: str, code: str, after: Mark | None = None, limit: int = MOST_ROWS
+    ) -> list[dict[str, Any]]:
+        """As `pages.history`."""
+        with self._asked(site, limit) as (session, number):
+            return pages.history(session, pages.place_id(session, number, code), after, limit)
+
+    def runs(self, site: str, after: str = "", limit: int = MOST_ROWS) -> list[dict[str, Any]]:
+        """As `pages.runs`."""
+        with self._asked(site, limit) as (session, number):
+            return pages.runs(session, number, after, limit)
+
+    def differences(
+        self, site: str, run: str, after: str = "", limit: int = MOST_ROWS
+    ) -> list[dict[str, Any]]:
+        """As `pages.differences`."""
+        with self._asked(site, limit) as (session, number):
+            return pages.differences(session, pages.run_id(session, number, run), after, limit)
+
+    def looks(
+        self, site: str, run: str, after: Mark | None = None, limit: int = MOST_ROWS
+    ) -> list[dict[str, Any]]:
+        """As `pages.looks_of_run`."""
+        with self._asked(site, limit) as (session, number):
+            return pages.looks_of_run(session, pages.run_id(session, number, run), after, limit)
+
+    def flights(self, site: str, after: Mark | None = None, limit: int = MOST_ROWS) -> list[dict[str, Any]]:
+        """As `pages.flights`."""
+        with self._asked(site, limit) as (session, number):
+            return pages.flights(session, number, after, limit)
+
+    def decisions(self, site: str, code: str, limit: int = MOST_ROWS) -> list[dict[str, Any]]:
+        """As `pages.decisions`."""
+        with self._asked(site, limit) as (session, number):
+            return pages.decisions(session, number, code, limit)
+
+    @contextmanager
+    def _asked(self, site: str, limit: int) -> Iterator[tuple[Session, int]]:
+        if not 1 <= limit <= MOST_ROWS:
+            raise InputError(f"a page has 1 to {MOST_ROWS} rows", key=f"limit={limit}")
+        with self._engine.reading() as session:
+            yield session, pages.site_id(session, site)

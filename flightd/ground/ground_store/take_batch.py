@@ -1,0 +1,218 @@
+"""A batch taken into the tables: what is there already stays, a look's standing only rises."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from flightd.core.inventory import Observation, PlannedLocation, Standing
+from flightd.ground.ground_store.batch import Batch, SentDecision, SentLook
+from flightd.ground.ground_store.derived import Moment, Touched, renew
+from flightd.ground.ground_store.engine import Engine, Session, listed
+from flightd.ground.ground_store.events import EventKind, Noted
+from flightd.ground.ground_store.reads_text import reads_text
+
+_LOOK = f"INSERT INTO observation VALUES ({', '.join('?' * 14)}) ON CONFLICT DO NOTHING"
+_TOLD = ("duration_s", "mission", "outcome", "reason", "verdict", "nodes_planned", "nodes_visited")
+"""Of a flight, when its log ended or was judged since."""
+_FLIGHT = (
+    f"INSERT INTO flight VALUES ({', '.join('?' * 11)}) ON CONFLICT (id)"
+    f" DO UPDATE SET {', '.join(f'{name} = excluded.{name}' for name in _TOLD)}"
+)
+_DECISION = "INSERT INTO decision VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING"
+_AUDIT = "INSERT INTO audit VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING"
+_PERSON = (
+    "INSERT INTO person VALUES (?, ?, ?, ?) ON CONFLICT (station, name)"
+    " DO UPDATE SET role = excluded.role, seen_ns = excluded.seen_ns"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """How many looks were new, and how many stand otherwise now."""
+
+    new: int = 0
+    changed: int = 0
+
+
+def take_batch(engine: Engine, session: Session, batch: Batch, utc_ns: int) -> Taken:
+    """Everything of the batch, in the caller's transaction, and what is derived of it."""
+    taken = Taken()
+    if batch.site:
+        site, noted = _site(session, batch.site), Noted(session, batch.site, utc_ns)
+        taken = _take_looks(engine, session, site, batch.places, batch.looks, noted)
+        _take_flights(session, site, batch)
+        _take_decisions(session, site, batch.decisions, noted)
+        noted.write()
+    session.run_many(
+        _PERSON, [(batch.source, person.name, person.role, person.seen_ns) for person in batch.people]
+    )
+    session.run_many(
+        _AUDIT,
+        [(a.id, batch.source, a.utc_ns, a.person, a.act, a.target, a.outcome, a.line) for a in batch.audit],
+    )
+    return taken
+
+
+def _take_flights(session: Session, site: int, batch: Batch) -> None:
+    session.run_many(
+        _FLIGHT,
+        [
+            (
+                bytes.fromhex(f.id), site, f.drone, f.began_ns, f.duration_s, f.mission, f.outcome, f.reason,
+                f.verdict, f.nodes_planned, f.nodes_visited,
+            )
+            for f in batch.flights
+        ],
+    )  # fmt: skip
+
+
+def _take_decisions(session: Session, site: int, decisions: Sequence[SentDecision], noted: Noted) -> None:
+    known: set[str] = set()
+    for marks, part in listed([decision.id for decision in decisions]):
+        known |= {row[0] for row in session.rows(f"SELECT id FROM decision WHERE id IN {marks}", *part)}
+    new = {decision.id: decision for decision in decisions if decision.id not in known}.values()
+    session.run_many(
+        _DECISION, [(d.id, site, d.place, d.utc_ns, d.seen_ns, d.what, d.who, d.note) for d in new]
+    )
+    for one in new:
+        noted.note(EventKind.PLACE_DECIDED, {"location": one.place, "what": one.what, "who": one.who})
+
+
+def _take_looks(
+    engine: Engine,
+    session: Session,
+    site: int,
+    planned: Sequence[PlannedLocation],
+    looks: Sequence[SentLook],
+    noted: Noted,
+) -> Taken:
+    nodes = {place.code: place.node for place in planned}
+    for look in looks:
+        pose = look.observation.pose
+        nodes.setdefault(look.observation.location, pose.node if pose else "")
+    places = _places(session, site, nodes)
+    unique: dict[str, SentLook] = {}
+    for look in looks:
+        known = unique.get(look.observation.id)
+        if known is None or look.standing > known.standing:
+            unique[look.observation.id] = look
+    kept = _kept(session, unique.values())
+    new = [look for identity, look in unique.items() if bytes.fromhex(identity) not in kept]
+    risen = [
+        look for identity, look in unique.items() if look.standing > kept.get(bytes.fromhex(identity), 99)
+    ]
+    runs = _runs(session, site, [look.observation for look in new], noted)
+    engine.make_room(session, {look.observation.utc_ns for look in new})
+    session.run_many(_LOOK, [_row(look, places, runs) for look in new])
+    session.run_many(
+        "UPDATE observation SET standing = ? WHERE id = ? AND utc_ns = ?",
+        [(int(look.standing), bytes.fromhex(look.observation.id), look.observation.utc_ns) for look in risen],
+    )
+    runs |= _run_ids(session, site, {look.observation.run for look in risen})
+    renew(session, _touched([*new, *risen], places, runs), noted)
+    return Taken(len(new), len(risen))
+
+
+def _site(session: Session, name: str) -> int:
+    session.run("INSERT INTO site (name) VALUES (?) ON CONFLICT DO NOTHING", name)
+    return int(session.rows("SELECT id FROM site WHERE name = ?", name)[0][0])
+
+
+def _places(session: Session, site: int, nodes: dict[str, str]) -> dict[str, int]:
+    """The id of each place; a place that is new is made."""
+    ids = _place_ids(session, site, list(nodes))
+    missing = sorted(nodes.keys() - ids.keys())
+    if missing:
+        session.run_many(
+            "INSERT INTO place (site, code, node) VALUES (?, ?, ?) ON CONFLICT DO NOTHING",
+            [(site, code, nodes[code]) for code in missing],
+        )
+        ids |= _place_ids(session, site, missing)
+    return ids
+
+
+def _place_ids(session: Session, site: int, codes: Sequence[str]) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for marks, part in listed(codes):
+        rows = session.rows(f"SELECT code, id FROM place WHERE site = ? AND code IN {marks}", site, *part)
+        found.update(rows)
+    return found
+
+
+def _kept(session: Session, looks: Iterable[SentLook]) -> dict[bytes, int]:
+    """Those that the store has already, with their standing there."""
+    sent = list(looks)
+    times = [look.observation.utc_ns for look in sent]
+    kept: dict[bytes, int] = {}
+    for marks, part in listed([bytes.fromhex(look.observation.id) for look in sent]):
+        rows = session.rows(
+            f"SELECT id, standing FROM observation WHERE id IN {marks} AND utc_ns BETWEEN ? AND ?",
+            *part,
+            min(times),
+            max(times),
+        )
+        kept.update(rows)
+    return kept
+
+
+def _runs(session: Session, site: int, looks: Sequence[Observation], noted: Noted) -> dict[str, int]:
+    """The ids of the runs of looks that are new; how many a run has, and between when, is kept beside it."""
+    by_run: dict[str, list[int]] = {}
+    for look in looks:
+        by_run.setdefault(look.run, []).append(look.utc_ns)
+    known = _run_ids(session, site, set(by_run))
+    for name, times in by_run.items():
+        if name not in known:
+            noted.note(EventKind.RUN_NEW, {"run": name})
+        session.run(
+            "INSERT INTO run (site, name, began_ns, ended_ns, looks) VALUES (?, ?, ?, ?, 0)"
+            " ON CONFLICT DO NOTHING",
+            site,
+            name,
+            min(times),
+            max(times),
+        )
+        session.run(
+            "UPDATE run SET looks = looks + ?, began_ns = CASE WHEN began_ns > ? THEN ? ELSE began_ns END,"
+            " ended_ns = CASE WHEN ended_ns < ? THEN ? ELSE ended_ns END WHERE site = ? AND name = ?",
+            len(times), min(times), min(times), max(times), max(times), site, name,
+        )  # fmt: skip
+    return _run_ids(session, site, set(by_run))
+
+
+def _run_ids(session: Session, site: int, names: set[str]) -> dict[str, int]:
+    found: dict[str, int] = {}
+    for marks, part in listed(sorted(names)):
+        rows = session.rows(f"SELECT name, id FROM run WHERE site = ? AND name IN {marks}", site, *part)
+        found.update(rows)
+    return found
+
+
+def _row(look: SentLook, places: dict[str, int], runs: dict[str, int]) -> tuple[object, ...]:
+    seen = look.observation
+    pose = seen.pose
+    where = (pose.node, pose.x_m, pose.y_m, pose.height_m, pose.yaw_rad) if pose else (None,) * 5
+    return (
+        bytes.fromhex(seen.id), seen.utc_ns, places[seen.location], runs[seen.run], seen.state.value,
+        float(seen.confidence), int(look.standing), *where, bytes.fromhex(seen.evidence) or None,
+        reads_text(seen.reads),
+    )  # fmt: skip
+
+
+def _touched(looks: Sequence[SentLook], places: dict[str, int], runs: dict[str, int]) -> list[Touched]:
+    """The places at which something counts that did not, or no longer."""
+    found: dict[int, Touched] = {}
+    for look in looks:
+        seen = look.observation
+        if look.standing is not Standing.PENDING:
+            place = places[seen.location]
+            touched = found.setdefault(place, Touched(place, seen.location))
+            touched.add(
+                Moment(
+                    seen.utc_ns, bytes.fromhex(seen.id), runs[seen.run], seen.state.value,
+                    reads_text(seen.reads), seen.confidence, bytes.fromhex(seen.evidence) or None,
+                ),
+                counts=look.standing is Standing.CONFIRMED,
+            )  # fmt: skip
+    return list(found.values())

@@ -1,0 +1,111 @@
+"""The OpenAPI document of the store's endpoints, made of the very table that serves them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flightd import __version__
+from flightd.ground.store_api.endpoints import ENDPOINTS, LIMIT, MOST, STATES, Endpoint, Parameter
+from flightd.inventory.count_change import CountChange
+
+_KINDS: dict[str, dict[str, Any]] = {
+    "string": {"type": "string"},
+    "number": {"type": "number"},
+    "integer": {"type": "integer"},
+    "object": {"type": "object"},
+    "array": {"type": "array", "items": {"type": "object"}},
+    "texts": {"type": "array", "items": {"type": "string"}},
+    "time": {"type": "string", "format": "date-time"},
+    "state": {"type": "string", "enum": list(STATES)},
+    "change": {"type": "string", "enum": [change.value for change in CountChange]},
+}
+_PARAMETERS: dict[str, dict[str, Any]] = {
+    "text": {"type": "string"},
+    "mark": {"type": "string"},
+    "state": _KINDS["state"],
+    "number": {"type": "integer", "minimum": 1, "maximum": MOST, "default": LIMIT},
+}
+_REFUSALS = {
+    "400": "A parameter is wrong.",
+    "401": "No key, or one that is nobody's.",
+    "403": "The key has not the scope.",
+    "404": "The store knows no such site, run or place.",
+    "503": "The store cannot be had now, or too many ask.",
+}
+
+
+def document() -> dict[str, Any]:
+    """All of it."""
+    paths: dict[str, Any] = {endpoint.path: {"get": _operation(endpoint)} for endpoint in ENDPOINTS}
+    paths["/pictures/{name}"] = {
+        "get": {
+            "operationId": "picture",
+            "summary": "A picture that was kept as evidence; it never changes.",
+            "parameters": [
+                {
+                    "name": "name",
+                    "in": "path",
+                    "required": True,
+                    "schema": {"type": "string", "pattern": "^[0-9a-f]{64}$"},
+                }
+            ],
+            "responses": {"200": {"description": "The JPEG.", "content": {"image/jpeg": {}}}, **_refused()},
+        }
+    }
+    return {
+        "openapi": "3.1.0",
+        "info": {"title": "flightd ground store", "version": __version__},
+        "servers": [{"url": "/api/v1"}],
+        "security": [{"key": []}],
+        "components": {
+            "securitySchemes": {"key": {"type": "http", "scheme": "bearer"}},
+            "schemas": {
+                "Refused": {
+                    "type": "object",
+                    "required": ["refused"],
+                    "properties": {"refused": {"type": "string"}},
+                }
+            },
+        },
+        "paths": paths,
+    }
+
+
+def _operation(endpoint: Endpoint) -> dict[str, Any]:
+    row = {
+        "type": "object",
+        "required": sorted(endpoint.fields),
+        "properties": {name: _field(kind) for name, kind in endpoint.fields.items()},
+    }
+    page = {
+        "type": "object",
+        "required": ["rows", "next"],
+        "properties": {"rows": {"type": "array", "items": row}, "next": {"type": ["string", "null"]}},
+    }
+    answer = {"description": "A page.", "content": {"application/json": {"schema": page}}}
+    return {
+        "operationId": endpoint.path.strip("/"),
+        "summary": endpoint.summary,
+        "parameters": [_parameter(parameter) for parameter in endpoint.parameters],
+        "responses": {"200": answer, **_refused()},
+    }
+
+
+def _parameter(parameter: Parameter) -> dict[str, Any]:
+    return {
+        "name": parameter.name,
+        "in": "query",
+        "required": parameter.needed,
+        "description": parameter.meaning,
+        "schema": _PARAMETERS[parameter.kind],
+    }
+
+
+def _field(kind: str) -> dict[str, Any]:
+    known = _KINDS[kind.removesuffix("?")]
+    return {"anyOf": [known, {"type": "null"}]} if kind.endswith("?") else known
+
+
+def _refused() -> dict[str, Any]:
+    body = {"application/json": {"schema": {"$ref": "#/components/schemas/Refused"}}}
+    return {code: {"description": why, "content": body} for code, why in _REFUSALS.items()}

@@ -1,0 +1,40 @@
+"""The store on both engines; PostgreSQL is one cluster for all tests here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psycopg
+import pytest
+
+from flightd.ground.ground_store.engine import Engine
+from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.postgres_engine import PostgresEngine
+from flightd.ground.ground_store.sqlite_engine import SqliteEngine
+from flightd.ground.ground_store.store import GroundStore
+from tests.rigs.postgres import postgres
+
+
+@pytest.fixture(scope="session")
+def cluster() -> Iterator[str]:
+    with postgres() as url:
+        yield url
+
+
+@pytest.fixture(params=["sqlite", "postgres"])
+def engine(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[[], Engine]]:
+    """Opens the same empty database each time."""
+    if request.param == "sqlite":
+        yield lambda: SqliteEngine(tmp_path / "store.db")
+        return
+    url = request.getfixturevalue("cluster")
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("DROP SCHEMA IF EXISTS flightd CASCADE")
+    yield lambda: PostgresEngine(url)
+
+
+@pytest.fixture
+def store(engine: Callable[[], Engine], tmp_path: Path) -> Iterator[GroundStore]:
+    with GroundStore(engine(), FolderEvidence(tmp_path / "evidence")) as opened:
+        yield opened

@@ -1,0 +1,248 @@
+"""A delivery may be cut anywhere: nothing is lost, nothing is there twice, on both engines."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import psycopg
+import pytest
+
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.inventory import LocationState, Observation, PlannedLocation, Standing
+from flightd.core.types import CodeRead
+from flightd.ground.decision_book import Decided, Decision, DecisionBook
+from flightd.ground.ground_store import sender
+from flightd.ground.ground_store.deliver_folder import deliver_path
+from flightd.ground.ground_store.engine import Engine, Row, Session
+from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.postgres_engine import PostgresSession
+from flightd.ground.ground_store.prune import prune
+from flightd.ground.ground_store.sender import Delivered, deliver_inventory
+from flightd.ground.ground_store.store import GroundStore
+from tests.web.stock_rig import RACKS, counted_store, flown_log, picture_of
+
+SITE = "hall 3"
+CUTS = 200
+_NS = 1_000_000_000
+_BEGIN = 1_760_000_000 * _NS
+
+
+class Cuts:
+    """An engine whose connection breaks now and then: at any statement, just before a commit is asked for, or
+    after it, so that nobody hears that it came to pass.  PostgreSQL's server process is ended for real."""
+
+    def __init__(self, engine: Engine, draw: random.Random, each: int) -> None:
+        self._engine = engine
+        self._draw = draw
+        self._each = each
+        self.came = 0
+        self.over = False
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._engine, name)
+
+    def cut(self, session: Session | None = None) -> None:
+        if self.over or self._draw.randrange(self._each):
+            return
+        self.came += 1
+        if isinstance(session, PostgresSession) and self._draw.random() < 0.3:
+            with contextlib.suppress(psycopg.OperationalError):
+                session.run("SELECT pg_terminate_backend(pg_backend_pid())")
+            return  # the next statement fails
+        raise UnavailableError("cut")
+
+    @contextmanager
+    def writing(self) -> Iterator[Session]:
+        with self._engine.writing() as session:
+            yield _CutSession(session, self)
+            self.cut(session)
+        self.cut()
+
+    @contextmanager
+    def reading(self) -> Iterator[Session]:
+        with self._engine.reading() as session:
+            yield _CutSession(session, self)
+
+
+class _CutSession:
+    def __init__(self, session: Session, cuts: Cuts) -> None:
+        self._session = session
+        self._cuts = cuts
+
+    def rows(self, sql: str, *values: object) -> list[Row]:
+        self._cuts.cut(self._session)
+        return self._session.rows(sql, *values)
+
+    def run(self, sql: str, *values: object) -> None:
+        self._cuts.cut(self._session)
+        self._session.run(sql, *values)
+
+    def run_many(self, sql: str, rows: Sequence[Sequence[object]]) -> None:
+        self._cuts.cut(self._session)
+        self._session.run_many(sql, rows)
+
+
+def seen(number: int, evidence: str = "") -> Observation:
+    """Ten places are counted over and over, a run each month."""
+    reads = (CodeRead("QR Code", f"PAL-{number % 7}", (), True, 3, 1.0),) if number % 4 else ()
+    state = LocationState.READ if reads else LocationState.EMPTY
+    at_ns = _BEGIN + number // 10 * 30 * 86_400 * _NS + number * _NS
+    return Observation(f"run {number // 10}", f"A-{number % 10}", at_ns, state, 0.5, reads, None, evidence)
+
+
+def same(store: GroundStore, inventory: SqliteStore) -> None:
+    """The store holds what the inventory holds, each once and as it stands there."""
+    looks = {look.id: standing for look, standing in inventory.looks()}
+    assert store.standings(list(looks)) == looks
+    assert store.counts()["looks"] == len(looks)
+    rows = [
+        row["id"]
+        for code in {row["location"] for row in store.stock(SITE)}
+        for row in store.history(SITE, code)
+    ]
+    assert sorted(rows) == sorted(looks)
+    stands = {row["location"]: (row["state"], tuple(row["texts"])) for row in store.stock(SITE)}
+    assert stands == {r.code: (r.state.value, r.texts) for r in inventory.locations()}
+    names = {look.evidence for look, _ in inventory.looks() if look.evidence}
+    assert store.missing_pictures(sorted(names)) == set()
+
+
+def test_two_hundred_cuts_lose_nothing_and_double_nothing(
+    engine: Callable[[], Engine], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While the drone goes on counting, confirming, withdrawing."""
+    monkeypatch.setattr(sender, "MOST_LOOKS", 4)
+    draw = random.Random(18)
+    real = engine()
+    store = GroundStore(real, FolderEvidence(tmp_path / "evidence"))
+    cuts = Cuts(real, draw, each=14)
+    store._engine = cuts  # type: ignore[assignment]  # noqa: SLF001
+    number = 0
+    with store, SqliteStore(tmp_path / "inventory") as inventory:
+        inventory.plan([PlannedLocation("A-3", "A1"), PlannedLocation("B-1", "B1")])
+        while cuts.came < CUTS:
+            if number < 60:
+                evidence = inventory.keep_evidence(b"\xff\xd8picture %d" % number) if number % 9 == 0 else ""
+                inventory.commit(seen(number, evidence), confirmed=draw.random() < 0.6)
+                inventory.settle(f"run {number // 10}", [f"A-{number % 10}"], confirmed=draw.random() < 0.7)
+                number += 1
+            elif not draw.randrange(8):  # another inventory comes by, and what was confirmed is withdrawn
+                inventory._insert(draw.choice(inventory.looks())[0], Standing.WITHDRAWN)  # noqa: SLF001
+            with contextlib.suppress(UnavailableError):
+                deliver_inventory(tmp_path / "inventory", SITE, "north", store, Delivered())
+        cuts.over = True
+        deliver_inventory(tmp_path / "inventory", SITE, "north", store, Delivered())
+        again = Delivered()
+        deliver_inventory(tmp_path / "inventory", SITE, "north", store, again)
+        assert (again.looks, again.changed, again.already) == (0, 0, number)
+        same(store, inventory)
+
+
+_CHILD = """
+import sys
+from pathlib import Path
+from flightd.ground.ground_store import sender
+from flightd.ground.ground_store.open_store import opened_store
+from flightd.ground.ground_store.sender import Delivered, deliver_inventory
+sender.MOST_LOOKS = 3
+with opened_store(sys.argv[1], Path(sys.argv[2])) as store:
+    take = store.take
+    def told(batch):
+        taken = take(batch)
+        print("taken", flush=True)
+        return taken
+    store.take = told
+    deliver_inventory(Path(sys.argv[3]), "hall 3", "north", store, Delivered())
+"""
+
+
+@pytest.mark.parametrize("kind", ["sqlite", "postgres"])
+def test_a_sender_that_is_killed_goes_on_where_it_was(
+    kind: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    if kind == "sqlite":
+        address = str(tmp_path / "store.db")
+    else:
+        address = request.getfixturevalue("cluster")
+        with psycopg.connect(address, autocommit=True) as connection:
+            connection.execute("DROP SCHEMA IF EXISTS flightd CASCADE")
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for number in range(60):
+            inventory.commit(seen(number))
+        command = [sys.executable, "-c", _CHILD, address, str(tmp_path / "pictures"), str(inventory.folder)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE) as child:
+            assert child.stdout is not None
+            for _ in range(7):
+                assert child.stdout.readline() == b"taken\n"
+            child.kill()
+        with GroundStore(_engine_at(address), FolderEvidence(tmp_path / "pictures")) as store:
+            had = store.counts()["looks"]
+            assert 9 <= had < 60
+            done = Delivered()
+            deliver_inventory(inventory.folder, SITE, "north", store, done)
+            assert (done.looks, done.already) == (60 - had, had)
+            same(store, inventory)
+
+
+def _engine_at(address: str) -> Engine:
+    from flightd.ground.ground_store.postgres_engine import PostgresEngine
+    from flightd.ground.ground_store.sqlite_engine import SqliteEngine
+
+    return PostgresEngine(address) if "://" in address else SqliteEngine(Path(address))
+
+
+def test_a_folder_is_delivered_with_flights_and_decisions(
+    store: GroundStore, tmp_path: Path, recorded_flight: Path
+) -> None:
+    folder = tmp_path / "station"
+    counted_store(folder / "monday")
+    flown_log(folder / "monday" / "flight.mcap", RACKS)
+    (folder / "tuesday.mcap").write_bytes((recorded_flight / "flight.mcap").read_bytes())
+    decision = Decision("decision-1", "AL-01-1-1", 5, 4, Decided.PUT_RIGHT, "ann", "torn")
+    DecisionBook(folder).add("monday", decision)
+    done = Delivered()
+    deliver_path(folder, "", "station", store, done)
+    assert (done.looks, done.pictures, done.flights, done.decisions) == (10, 1, 1, 1)
+    assert [row["who"] for row in store.decisions(RACKS.name, "AL-01-1-1")] == ["ann"]
+    flown = [flight for site in store.sites() for flight in store.flights(site["site"])]
+    assert [flight["outcome"] for flight in flown] == ["completed"]
+    (place,) = [row for row in store.stock(RACKS.name) if row["location"] == "AL-01-1-1"]
+    assert store.evidence.picture(place["evidence"]) == picture_of("00340123450002439853")
+
+
+def test_an_inventory_of_no_known_site_is_refused(store: GroundStore, tmp_path: Path) -> None:
+    counted_store(tmp_path / "monday")
+    with pytest.raises(InputError, match=r"monday: no flight log beside .*; add --site NAME$"):
+        deliver_path(tmp_path / "monday" / "inventory.db", "", "station", store, Delivered())
+    deliver_path(tmp_path / "monday", SITE, "station", store, Delivered())
+    assert store.counts()["looks"] == 10
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match=r"neither an inventory\.db nor a flight log"):
+        deliver_path(tmp_path / "empty", SITE, "station", store, Delivered())
+
+
+def test_only_what_the_store_has_is_pruned(store: GroundStore, tmp_path: Path) -> None:
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for number in range(25):
+            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
+        assert (pruned := prune(inventory.folder, store)).looks == 0
+        assert pruned.stay == 20  # those of the newest run are not asked for
+        deliver_inventory(inventory.folder, SITE, "north", store, Delivered())
+        lost = inventory.looks()[3][0]
+        (tmp_path / "evidence" / lost.evidence[:2] / f"{lost.evidence}.jpg").unlink()  # in the store
+        before = inventory.locations()
+        pruned = prune(inventory.folder, store)
+        # 10 looks of run 0 without the one whose picture the store lost, and 5 of run 1 that run 2 follows
+        assert (pruned.looks, pruned.pictures, pruned.stay) == (14, 19, 1)
+        assert inventory.locations() == before
+        assert inventory.evidence.path(lost.evidence).exists()
+        assert lost in [look for look, _ in inventory.looks()]
+        assert prune(inventory.folder, store).looks == 0
+    assert store.counts()["looks"] == 25

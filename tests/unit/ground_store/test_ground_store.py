@@ -1,0 +1,331 @@
+"""The ground store holds what it promises, on SQLite and on PostgreSQL alike."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pytest
+
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, Standing
+from flightd.core.types import CodeRead
+from flightd.ground.ground_store.batch import Batch, SentDecision, SentFlight, SentLine, SentLook, SentPerson
+from flightd.ground.ground_store.engine import Engine
+from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.migrations import newest_version
+from flightd.ground.ground_store.pages import Mark
+from flightd.ground.ground_store.postgres_engine import PostgresEngine
+from flightd.ground.ground_store.sqlite_engine import SqliteEngine
+from flightd.ground.ground_store.store import GroundStore
+
+_NS = 1_000_000_000
+_DAY = 86_400 * _NS
+_BEGIN = 1_760_000_000 * _NS
+SITE = "hall 3"
+
+
+def read(text: str) -> CodeRead:
+    return CodeRead("QR Code", text, (), True, 3, 1.0, (("00", "340123450002439853"),))
+
+
+def look(
+    location: str = "A-1",
+    *texts: str,
+    run: str = "monday",
+    at_ns: int = _BEGIN,
+    standing: Standing = Standing.CONFIRMED,
+    state: LocationState | None = None,
+    evidence: str = "",
+) -> SentLook:
+    known = (LocationState.EMPTY, LocationState.READ, LocationState.SEVERAL)[min(len(texts), 2)]
+    pose = CountPose("A1", 0.25, -1.0, 0.9, -1.57)
+    reads = tuple(map(read, texts))
+    seen = Observation(run, location, at_ns, state or known, 0.875, reads, pose, evidence)
+    return SentLook(seen, standing)
+
+
+def batch(*looks: SentLook, places: tuple[PlannedLocation, ...] = (), site: str = SITE) -> Batch:
+    return Batch(site, "drone-1", places, looks)
+
+
+def places_of(store: GroundStore) -> dict[str, tuple[str, list[str], str | None]]:
+    return {row["location"]: (row["state"], row["texts"], row["run"]) for row in store.stock(SITE)}
+
+
+def test_what_was_taken_is_there_when_it_is_opened_again(
+    engine: Callable[[], Engine], tmp_path: Path
+) -> None:
+    evidence = FolderEvidence(tmp_path / "evidence")
+    with GroundStore(engine(), evidence) as first:
+        first.take(batch(look("A-1", "PAL-1"), places=(PlannedLocation("A-2", "A7"),)))
+    with GroundStore(engine(), evidence) as second:
+        assert second.id == first.id
+        assert places_of(second) == {"A-1": ("read", ["PAL-1"], "monday"), "A-2": ("not_visited", [], None)}
+        assert second.stock(SITE)[1]["node"] == "A7"
+
+
+def test_a_look_comes_back_as_it_was_seen(store: GroundStore) -> None:
+    store.take(batch(look("A-1", 'a"\x1d\N{SNOWMAN}\0', "b", evidence="ab" * 32)))
+    (row,) = store.history(SITE, "A-1")
+    assert row["id"] == look("A-1", 'a"\x1d\N{SNOWMAN}\0', "b", evidence="ab" * 32).observation.id
+    assert [told["text"] for told in row["reads"]] == ['a"\x1d\N{SNOWMAN}\0', "b"]
+    assert row["reads"][0]["gs1"] == [["00", "340123450002439853"]]
+    assert (row["evidence"], row["confidence"], row["standing"]) == ("ab" * 32, 0.875, "confirmed")
+    assert row["pose"] == {"node": "A1", "x_m": 0.25, "y_m": -1.0, "height_m": 0.9, "yaw_rad": -1.57}
+
+
+def test_the_same_look_counts_once_however_it_comes(store: GroundStore) -> None:
+    seen = look("A-1", "PAL-1")
+    assert store.take(batch(seen, seen)).new == 1
+    again, other = store.take(batch(seen, seen)), store.take(batch(seen, look("A-2")))
+    assert (again.new, again.already, other.new, other.already) == (0, 2, 1, 1)
+    assert store.counts()["looks"] == 2
+
+
+def test_a_standing_only_rises(store: GroundStore) -> None:
+    def sent(standing: Standing) -> int:
+        return store.take(batch(look("A-1", "PAL-1", standing=standing), look(str(standing)))).changed
+
+    assert [sent(s) for s in (Standing.PENDING, Standing.CONFIRMED, Standing.PENDING)] == [0, 1, 0]
+    assert places_of(store)["A-1"][0] == "read"
+    assert sent(Standing.WITHDRAWN) == 1
+    assert places_of(store)["A-1"] == ("not_visited", [], None)
+    assert store.history(SITE, "A-1")[0]["standing"] == "withdrawn"
+    assert store.standings([look("A-1", "PAL-1").observation.id, "00" * 32]) == {
+        look("A-1", "PAL-1").observation.id: Standing.WITHDRAWN
+    }
+
+
+def test_a_run_differs_where_the_count_before_it_said_otherwise(store: GroundStore) -> None:
+    before = [look("A-1", "PAL-1"), look("A-2"), look("A-3", "PAL-3"), look("A-4", "x-4"), look("A-5", "5")]
+    after = [
+        look("A-1", run="tuesday", at_ns=_BEGIN + _DAY),
+        look("A-2", "PAL-2", run="tuesday", at_ns=_BEGIN + _DAY),
+        look("A-3", "PAL-33", run="tuesday", at_ns=_BEGIN + _DAY),
+        look("A-4", "X-4", run="tuesday", at_ns=_BEGIN + _DAY),  # the same code
+        look("A-5", run="tuesday", at_ns=_BEGIN + _DAY, state=LocationState.OCCLUDED),
+        look("A-6", "PAL-6", run="tuesday", at_ns=_BEGIN + _DAY),  # never counted before
+    ]
+    store.take(batch(*after))
+    assert store.differences(SITE, "tuesday") == []
+    store.take(batch(*before))  # late
+    found = {row["location"]: row["change"] for row in store.differences(SITE, "tuesday")}
+    assert found == {"A-1": "gone", "A-2": "appeared", "A-3": "replaced", "A-5": "unseen"}
+    (third,) = store.differences(SITE, "tuesday", after="A-2", limit=1)
+    assert (third["texts"], third["before_texts"], third["before_run"]) == (["PAL-33"], ["PAL-3"], "monday")
+    assert store.differences(SITE, "monday") == []
+
+
+def _simulated(draw: random.Random) -> list[SentLook]:
+    """Looks of some runs over three months at few places, in every state and standing."""
+    unread = [LocationState.UNREADABLE, LocationState.OCCLUDED]
+    looks = []
+    for number in range(draw.randint(5, 40)):
+        texts = draw.choice([(), ("a",), ("A",), ("b",), ("a", "b")])
+        state = draw.choice(unread) if not texts and draw.random() < 0.3 else None
+        run = draw.randrange(4)
+        at_ns = _BEGIN + (run * 20 + draw.randrange(25)) * _DAY + draw.choice([0, number])
+        standing = draw.choices(list(Standing), (1, 4, 1))[0]
+        place = f"A-{draw.randrange(3)}"
+        looks.append(look(place, *texts, run=f"run {run}", at_ns=at_ns, standing=standing, state=state))
+    return looks
+
+
+def _expected(looks: list[SentLook]) -> tuple[dict[str, object], dict[str, dict[str, object]]]:
+    """What stands and what differs, from all looks at once."""
+    standing: dict[str, SentLook] = {}
+    for one in looks:
+        known = standing.setdefault(one.observation.id, one)
+        if one.standing > known.standing:
+            standing[one.observation.id] = one
+    order = sorted(standing.values(), key=lambda one: (one.observation.utc_ns, one.observation.id))
+    counting = [one.observation for one in order if one.standing is Standing.CONFIRMED]
+    places: dict[str, object] = {one.observation.location: "not_visited" for one in looks}
+    places |= {seen.location: (seen.state.value, seen.run) for seen in counting}
+    differ: dict[str, dict[str, object]] = {one.observation.run: {} for one in looks}
+    for run, differs in differ.items():
+        for place in places:
+            here = [seen for seen in counting if seen.location == place]
+            own = [i for i, seen in enumerate(here) if seen.run == run]
+            if own:
+                earlier = [s for s in here[: own[-1]] if s.run != run and s.state.is_counted]
+                now = here[own[-1]]
+                if earlier and _says(earlier[-1]) != _says(now):
+                    differs[place] = earlier[-1].run
+    return places, differ
+
+
+def _says(seen: Observation) -> object:
+    return {read.text.casefold() for read in seen.reads} if seen.state.is_counted else None
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_order_of_delivery_changes_nothing(store: GroundStore, seed: int) -> None:
+    draw = random.Random(seed)
+    looks = _simulated(draw)
+    sent = looks * 2
+    draw.shuffle(sent)
+    while sent:
+        size = draw.randint(1, 12)
+        store.take(batch(*sent[:size]))
+        del sent[:size]
+    places, differ = _expected(looks)
+    stands = {
+        row["location"]: (row["state"], row["run"]) if row["run"] else row["state"]
+        for row in store.stock(SITE)
+    }
+    assert stands == places
+    told = {
+        run["run"]: {row["location"]: row["before_run"] for row in store.differences(SITE, run["run"])}
+        for run in store.runs(SITE)
+    }
+    assert told == differ
+    assert store.counts()["looks"] == len({one.observation.id for one in looks})
+
+
+def test_pages_follow_one_another_without_gap(store: GroundStore) -> None:
+    looks = [
+        look(f"A-{n % 5}", f"P{n}", run=f"run {n // 10}", at_ns=_BEGIN + n // 3 * 20 * _DAY)
+        for n in range(30)
+    ]
+    store.take(batch(*looks))
+    codes: list[str] = []
+    while rows := store.stock(SITE, codes[-1] if codes else "", limit=2):
+        codes += [row["location"] for row in rows]
+    assert codes == [f"A-{n}" for n in range(5)]
+    seen: list[str] = []
+    mark = None
+    while rows := store.history(SITE, "A-3", mark, limit=2):
+        seen += [row["id"] for row in rows]
+        mark = Mark.read(str(Mark(rows[-1]["utc_ns"], bytes.fromhex(rows[-1]["id"]))))
+    at = [one.observation for one in looks if one.observation.location == "A-3"]
+    assert seen == [o.id for o in sorted(at, key=lambda o: (o.utc_ns, o.id), reverse=True)]
+    of_run, mark = [], None
+    while rows := store.looks(SITE, "run 1", mark, limit=3):
+        of_run += [row["id"] for row in rows]
+        mark = Mark(rows[-1]["utc_ns"], bytes.fromhex(rows[-1]["id"]))
+    mine = [one.observation for one in looks if one.observation.run == "run 1"]
+    assert of_run == [o.id for o in sorted(mine, key=lambda o: (o.utc_ns, o.id))]
+    assert [run["run"] for run in store.runs(SITE, limit=2)] == ["run 2", "run 1"]
+    assert [run["run"] for run in store.runs(SITE, after="run 1")] == ["run 0"]
+    assert [row["location"] for row in store.stock(SITE, state=LocationState.EMPTY)] == []
+
+
+def test_sites_do_not_mix(store: GroundStore) -> None:
+    store.take(batch(look("A-1", "here")))
+    store.take(batch(look("A-1", "there"), site="hall 4"))
+    assert [row["site"] for row in store.sites()] == ["hall 3", "hall 4"]
+    assert store.stock("hall 4")[0]["texts"] == ["there"]
+    assert [row["reads"][0]["text"] for row in store.history(SITE, "A-1")] == ["here"]
+
+
+def test_flights_decisions_people_and_audit_are_taken_once(store: GroundStore) -> None:
+    flight = SentFlight("ab" * 32, "north", _BEGIN, 61.5, "every node", "flying", "", "", 12, None)
+    over = SentFlight("ab" * 32, "north", _BEGIN, 90.0, "every node", "completed", "", "good", 12, 12)
+    decided = SentDecision("decision-1", "A-1", _BEGIN, 0, "put_right", "ann", "label was torn")
+    line = SentLine(_BEGIN, "ann", "start", "north", "accepted", '{"time": "…"}')
+    people = (SentPerson("ann", "operator", _BEGIN),)
+    for flown in (flight, over, over):
+        store.take(
+            Batch(SITE, "station", flights=(flown,), decisions=(decided,), people=people, audit=(line,))
+        )
+    (row,) = store.flights(SITE)
+    assert (row["outcome"], row["duration_s"], row["nodes_visited"]) == ("completed", 90.0, 12)
+    assert [one["who"] for one in store.decisions(SITE, "A-1")] == ["ann"]
+    assert store.counts()["flights"] == 1
+
+
+def test_times_of_clocks_far_off_are_kept(store: GroundStore) -> None:
+    store.take(batch(look("A-1", "early", at_ns=5), look("A-1", "late", at_ns=(1 << 63) - 1)))
+    assert [row["reads"][0]["text"] for row in store.history(SITE, "A-1")] == ["late", "early"]
+
+
+@pytest.mark.parametrize(
+    ("ask", "why"),
+    [
+        (lambda s: s.stock("hall 9"), "there is no site 'hall 9'"),
+        (lambda s: s.history(SITE, "Z-9"), "there is no place 'Z-9'"),
+        (lambda s: s.differences(SITE, "sunday"), "there is no run 'sunday'"),
+        (lambda s: s.runs(SITE, after="sunday"), "there is no run 'sunday'"),
+        (lambda s: s.stock(SITE, limit=1001), "limit=1001: a page has 1 to 1000 rows"),
+        (lambda s: s.take(batch(look("A\0"))), "the name 'A\\x00' is no text"),
+        (lambda s: s.take(batch(look("A-1"), site="")), "of no site"),
+        (lambda s: s.take(batch(look("A-1", at_ns=-1))), "drone-1: A-1: a look at no time"),
+        (lambda s: s.take(batch(*[look()] * 501)), "a batch of 501 looks; send at most 500"),
+        (lambda s: Mark.read("99999999999999999999-00"), "no mark of a page"),
+    ],
+)
+def test_what_is_asked_wrongly_is_refused_in_a_line(
+    store: GroundStore, ask: Callable[[GroundStore], object], why: str
+) -> None:
+    store.take(batch(look("A-1", "PAL-1")))
+    with pytest.raises(InputError) as caught:
+        ask(store)
+    assert why in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_store_of_a_newer_version_is_refused(engine: Callable[[], Engine], tmp_path: Path) -> None:
+    evidence = FolderEvidence(tmp_path / "evidence")
+    GroundStore(engine(), evidence).close()
+    newer = engine()
+    with newer.writing() as session:
+        newer.set_version(session, 99)
+    newer.close()
+    with pytest.raises(InputError) as caught:
+        GroundStore(engine(), evidence)
+    known = newest_version(newer.kind)
+    assert str(caught.value).endswith(
+        f"a store of version 99, known here is {known}; use the flightd that made it"
+    )
+
+
+def test_a_database_that_cannot_be_had_is_told_in_a_line(tmp_path: Path) -> None:
+    evidence = FolderEvidence(tmp_path)
+    with pytest.raises(UnavailableError) as caught:
+        GroundStore(PostgresEngine(f"postgresql://ann:secret@/x?host={tmp_path}"), evidence)
+    assert "secret" not in str(caught.value)
+    assert "\n" not in str(caught.value)
+    (tmp_path / "other.db").write_bytes(b"no database at all, but long enough to be one" * 50)
+    with pytest.raises(InputError, match="no ground store, or a damaged one"):
+        GroundStore(SqliteEngine(tmp_path / "other.db"), evidence)
+    with pytest.raises(InputError, match="not a URL of PostgreSQL"):
+        PostgresEngine("postgresql://ann:sec%ret@/x")
+
+
+def _asked(question: str) -> list[tuple[Any, ...]]:
+    relation = duckdb.sql(question)
+    assert relation is not None
+    return relation.fetchall()
+
+
+def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> None:
+    store.take(batch(look("A-1", 'a"b,\n', run="monday"), look("A-2", standing=Standing.PENDING)))
+    store.take(batch(look("A-1", run="tuesday", at_ns=_BEGIN + _DAY + 7), look("A-9", "x")))
+    store.take(batch(look("A-1", "other"), site="hall 4"))
+    assert store.export(SITE, tmp_path / "it's out") == {"observations": 4, "differences": 1}
+    observations = str(tmp_path / "it's out" / "observations.parquet").replace("'", "''")
+    differences = observations.replace("observations", "differences")
+    told = _asked(
+        f"SELECT site, run, location, state, epoch_ns(utc), evidence, reads FROM '{observations}'"
+        " ORDER BY utc, location"
+    )
+    assert [row[2:5] for row in told] == [
+        ("A-1", "read", _BEGIN), ("A-2", "empty", _BEGIN), ("A-9", "read", _BEGIN),
+        ("A-1", "empty", _BEGIN + _DAY + 7),
+    ]  # fmt: skip
+    assert (told[0][:2], told[0][5], json.loads(told[0][6])[0][1]) == ((SITE, "monday"), None, 'a"b,\n')
+    assert json.loads(told[2][6])[0][1] == "x"
+    changed = _asked(f"SELECT location, change, before_texts FROM '{differences}'")
+    assert changed == [("A-1", "gone", json.dumps(['a"b,\n']))]
+    assert store.export("", tmp_path / "all")["observations"] == 5
+    store.take(batch(places=(PlannedLocation("A-1", "A1"),), site="hall 5"))  # nobody looked yet
+    assert store.export("hall 5", tmp_path / "empty") == {"observations": 0, "differences": 0}
+    assert _asked(f"SELECT * FROM '{tmp_path / 'empty' / 'observations.parquet'}'") == []
+    with pytest.raises(InputError, match="there is no site 'hall 9'"):
+        store.export("hall 9", tmp_path / "none")
