@@ -132,7 +132,7 @@ def opened(
 def new_context(
     browser: Browser, size: tuple[int, int], scheme: str, locale: str = "en-US"
 ) -> BrowserContext:
-    """A person's browser: `scheme` light or dark, axe-core at hand in every page."""
+    """A person's browser: `scheme` light or dark."""
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]},
         color_scheme="dark" if scheme == "dark" else "light",
@@ -141,12 +141,15 @@ def new_context(
     )
     context.set_default_timeout(30_000)
     context.grant_permissions(["screen-wake-lock"])  # as every browser with a screen has it
-    context.add_init_script(path=AXE)
     return context
 
 
 def hindrances(page: Page) -> list[str]:
-    """What axe-core finds serious or critical for people with disabilities: rule and element."""
+    """What axe-core finds serious or critical for people with disabilities: rule and element.
+
+    Only a page that is asked reads it: that costs as much as the page."""
+    if page.evaluate("typeof axe") == "undefined":
+        page.evaluate(f"() => {{ {AXE.read_text()} }}")
     found = page.evaluate("() => axe.run(document, {resultTypes: ['violations']})")
     return [
         f"{violation['id']}: {node['html']}"
