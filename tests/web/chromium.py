@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.web.forked_stations import forked_station
 from tools.system_browser import system_browser
 
 if TYPE_CHECKING:
@@ -85,10 +84,7 @@ def station(
 @contextlib.contextmanager
 def started(words: Sequence[str]) -> Iterator[str]:
     """`flightd ground` with these words; its address."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "flightd", "ground", *words], cwd=ROOT, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stderr is not None
+    process = forked_station(list(words))
     with process.stderr:
         try:
             said: list[str] = []
