@@ -63,14 +63,21 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whole flights first, then what needs a browser: one that began last would keep one core busy while the
-    other waits."""
+    other waits.  Of those by the clock come last what needs little of the machine: they are short."""
     items.sort(
         key=lambda item: (
+            -_cores_of(item),
             item.get_closest_marker("slow") is None,
             "/sim/" not in item.nodeid,
             _IN_BROWSER.match(item.nodeid) is None,
         )
     )
+
+
+def _cores_of(item: pytest.Item) -> float:
+    """What a test that flies by the clock needs free; 0: another one."""
+    marker = item.get_closest_marker("realtime")
+    return 0.0 if marker is None else Needs(**marker.kwargs).cores
 
 
 class _CostlyTogether(LoadScopeScheduling):  # type: ignore[misc]  # its library has no types

@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.web.forked_stations import forked_station
 from tools.system_browser import system_browser
 
 if TYPE_CHECKING:
@@ -85,10 +84,7 @@ def station(
 @contextlib.contextmanager
 def started(words: Sequence[str]) -> Iterator[str]:
     """`flightd ground` with these words; its address."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "flightd", "ground", *words], cwd=ROOT, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stderr is not None
+    process = forked_station(list(words))
     with process.stderr:
         try:
             said: list[str] = []
@@ -132,7 +128,7 @@ def opened(
 def new_context(
     browser: Browser, size: tuple[int, int], scheme: str, locale: str = "en-US"
 ) -> BrowserContext:
-    """A person's browser: `scheme` light or dark, axe-core at hand in every page."""
+    """A person's browser: `scheme` light or dark."""
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]},
         color_scheme="dark" if scheme == "dark" else "light",
@@ -141,12 +137,15 @@ def new_context(
     )
     context.set_default_timeout(30_000)
     context.grant_permissions(["screen-wake-lock"])  # as every browser with a screen has it
-    context.add_init_script(path=AXE)
     return context
 
 
 def hindrances(page: Page) -> list[str]:
-    """What axe-core finds serious or critical for people with disabilities: rule and element."""
+    """What axe-core finds serious or critical for people with disabilities: rule and element.
+
+    Only a page that is asked reads it: that costs as much as the page."""
+    if page.evaluate("typeof axe") == "undefined":
+        page.evaluate(f"() => {{ {AXE.read_text()} }}")
     found = page.evaluate("() => axe.run(document, {resultTypes: ['violations']})")
     return [
         f"{violation['id']}: {node['html']}"

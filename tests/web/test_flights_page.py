@@ -69,8 +69,8 @@ def all_read(page: Page) -> None:
     expect(page.get_by_text("4 flights", exact=True)).to_be_visible()
 
 
-def open_flight(page: Page, url: str, year: str = "2023") -> None:
-    page.goto(f"{url}/flights")
+def open_flight(page: Page, year: str = "2023") -> None:
+    """From the list."""
     all_read(page)
     page.get_by_role("link", name=re.compile(year)).click()
     expect(page.get_by_role("img", name="Height, m, over time")).to_be_visible()
@@ -146,7 +146,7 @@ def test_one_goes_from_row_to_row_and_opens_a_flight_by_keyboard(browser: Browse
 @pytest.mark.parametrize(("size", "scheme"), SIZES)
 def test_a_flight_is_played_back(size: tuple[int, int], scheme: str, browser: Browser, url: str) -> None:
     with opened(browser, f"{url}/flights", size, scheme) as page:
-        open_flight(page, url)
+        open_flight(page)
         expect(page.get_by_role("group", name="Map of demo")).to_be_visible()
         expect(page.get_by_role("img", name=re.compile("Down camera: [12] line"))).to_be_visible()
         page.get_by_role("button", name="Play").click()
@@ -164,7 +164,7 @@ def test_a_flight_is_played_back(size: tuple[int, int], scheme: str, browser: Br
 
 def test_time_is_moved_by_keys_wherever_nobody_types(browser: Browser, url: str) -> None:
     with opened(browser, f"{url}/flights") as page:
-        open_flight(page, url)
+        open_flight(page)
         page.keyboard.press("ArrowRight")
         page.keyboard.press("ArrowRight")
         page.keyboard.press("Shift+ArrowRight")
@@ -203,20 +203,11 @@ def test_time_is_moved_by_keys_wherever_nobody_types(browser: Browser, url: str)
         assert now_s(page) == before_s, "the list of speeds has its own keys"
 
 
-def test_the_slider_itself_obeys_the_same_keys_once(browser: Browser, url: str) -> None:
+def test_a_click_on_a_plot_or_an_event_goes_to_its_time_and_plots_show_a_stretch_around_it(
+    browser: Browser, url: str
+) -> None:
     with opened(browser, f"{url}/flights") as page:
-        open_flight(page, url)
-        slider(page).focus()
-        page.keyboard.press("ArrowRight")
-        expect(slider(page)).to_have_value("1")
-        said = slider(page).get_attribute("aria-valuetext")
-        assert said is not None
-        assert said.startswith("0:01.0, On the ground")
-
-
-def test_a_click_on_a_plot_or_an_event_goes_to_its_time(browser: Browser, url: str) -> None:
-    with opened(browser, f"{url}/flights") as page:
-        open_flight(page, url)
+        open_flight(page)
         whole_s = float(slider(page).get_attribute("max") or 0)
         plot = page.get_by_role("img", name="Speed, m/s, over time").locator(".u-over")
         plot.evaluate("plot => plot.scrollIntoView({block: 'center'})")
@@ -231,10 +222,8 @@ def test_a_click_on_a_plot_or_an_event_goes_to_its_time(browser: Browser, url: s
         expect(page.get_by_role("heading", name="Taking off")).to_be_visible()
         assert now_s(page) == pytest.approx(2.5, abs=0.2)
 
-
-def test_plots_show_a_stretch_around_the_time_in_more_detail(browser: Browser, url: str) -> None:
-    with opened(browser, f"{url}/flights") as page:
-        open_flight(page, url)
+        slider(page).press("Home")
+        expect(slider(page)).to_have_value("0")
         asked: list[str] = []
         page.on("request", lambda request: asked.append(request.url))
         page.keyboard.press("Shift+ArrowRight")
@@ -284,13 +273,13 @@ def test_what_cannot_be_shown_says_so_and_is_tried_again(browser: Browser, url: 
 
 def test_a_broken_log_is_played_as_far_as_it_goes(browser: Browser, url: str) -> None:
     with opened(browser, f"{url}/flights") as page:
-        open_flight(page, url, "2017")
+        open_flight(page, "2017")
         expect(page.get_by_text("The log is cut off before its end")).to_be_visible()
 
 
 def test_a_report_opens_beside_and_reaches_nothing_of_the_station(browser: Browser, url: str) -> None:
     with opened(browser, f"{url}/flights") as page:
-        open_flight(page, url)
+        open_flight(page)
         with page.context.expect_page(timeout=60_000) as other:
             page.get_by_role("link", name="Report").click()
         report = other.value
@@ -301,16 +290,11 @@ def test_a_report_opens_beside_and_reaches_nothing_of_the_station(browser: Brows
         assert reached == "refused"
 
 
-def test_escape_stops_on_this_page_too(browser: Browser, url: str) -> None:
+def test_a_flight_takes_focus_and_title_keys_scroll_the_slider_obeys_them_once_and_escape_stops(
+    browser: Browser, url: str
+) -> None:
     with opened(browser, f"{url}/flights") as page:
-        open_flight(page, url)
-        page.keyboard.press("Escape")
-        expect(page.get_by_role("button", name="STOPPING")).to_be_visible()
-
-
-def test_page_keys_scroll_and_a_flight_takes_focus_and_title(browser: Browser, url: str) -> None:
-    with opened(browser, f"{url}/flights") as page:
-        open_flight(page, url)
+        open_flight(page)
         expect(page.get_by_role("main")).to_be_focused()
         expect(page).to_have_title(re.compile("2023.* · Flights · flightd$"))
         for key in ("PageDown", "PageUp"):
@@ -318,6 +302,16 @@ def test_page_keys_scroll_and_a_flight_takes_focus_and_title(browser: Browser, u
         assert now_s(page) == 0.0
         page.keyboard.press("End")
         expect(slider(page)).not_to_have_value("0")
+        page.keyboard.press("Home")
+        expect(slider(page)).to_have_value("0")
+        slider(page).focus()
+        page.keyboard.press("ArrowRight")
+        expect(slider(page)).to_have_value("1")
+        said = slider(page).get_attribute("aria-valuetext")
+        assert said is not None
+        assert said.startswith("0:01.0, On the ground")
+        page.keyboard.press("Escape")
+        expect(page.get_by_role("button", name="STOPPING")).to_be_visible()
 
 
 def test_without_a_folder_the_page_says_how_to_give_one(browser: Browser) -> None:
