@@ -89,6 +89,19 @@ class ActionGraph:
                             latest[other] = its
                 if latest:
                     self._waits[drone, number] = tuple(latest.items())
+        self._check_ends(users, conflicts)
+
+    def _check_ends(
+        self, users: Mapping[int, Sequence[tuple[int, int, str, int]]], conflicts: Conflicts
+    ) -> None:
+        """Nobody passes where another drone stays at the end of its course."""
+        for drone, course in self._courses.items():
+            last = course.actions[-1] if course.actions else None
+            place, since_ms = (last.vertex, last.end_ms) if last else (course.place, 0)
+            for resource in conflicts[place]:
+                for _, end_ms, other, _ in users.get(resource, ()):
+                    if other != drone and end_ms > since_ms:
+                        raise ConflictingPlansError(f"{other} passes where {drone} stays")
 
     def _topological(self) -> tuple[ActionKey, ...]:
         """Kahn's algorithm."""
@@ -115,27 +128,27 @@ class ActionGraph:
             raise CyclicDependenciesError(f"{', '.join(dict.fromkeys(stuck))} wait for each other in a circle")
         return tuple(order)
 
-    def projected(self, now_ms: int, done_ms: Mapping[ActionKey, int] | None = None) -> dict[str, list[Action]]:
-        """The actions ahead at the times that come of the order alone, from now on, when each takes as long as
-        planned; `done_ms` has when actions that were begun will be done."""
+    def projected(
+        self, now_ms: int, done: Mapping[str, int], ends_ms: Mapping[ActionKey, int]
+    ) -> dict[str, list[Action]]:
+        """The actions that are not done (`done` has the number of each drone's first one), at the times that come
+        of the order alone, from now on, when each takes as long as planned; `ends_ms` has when those that were
+        begun will be done."""
         ends: dict[ActionKey, int] = {}
-        found: dict[ActionKey, Action] = {}
+        found: dict[str, list[Action]] = {drone: [] for drone in self._courses}
         for key in self.order:
             drone, number = key
+            if number < done[drone]:
+                continue
             action = self.action(key)
-            earlier = [ends[before] for before in self.waits_for(key)]
-            if number > self._courses[drone].first:
-                earlier.append(ends[drone, number - 1])
-            start_ms = max(earlier, default=now_ms)
+            start_ms = max((ends.get(before, now_ms) for before in self.waits_for(key)), default=now_ms)
+            start_ms = max(start_ms, ends.get((drone, number - 1), now_ms))
             end_ms = start_ms + action.duration_ms
-            if done_ms and key in done_ms:
-                end_ms = max(done_ms[key], start_ms + 1)
+            if key in ends_ms:
+                end_ms = max(ends_ms[key], start_ms + 1)
             ends[key] = end_ms
-            found[key] = _at(action, start_ms, end_ms)
-        return {
-            drone: [found[drone, course.first + i] for i in range(len(course.actions))]
-            for drone, course in self._courses.items()
-        }
+            found[drone].append(_at(action, start_ms, end_ms))
+        return found
 
 
 def _at(action: Action, start_ms: int, end_ms: int) -> Action:

@@ -23,6 +23,9 @@ from flightd.fleet.traffic.sipp import Effort, Sipp
 from flightd.fleet.traffic.tours import Request, plan_tour
 
 _RAISED_AT_MOST: Final = 4
+WEIGHT: Final = 2.0
+"""Of the estimate against the time flown (bounded-suboptimal SIPP, K. Yakovlev et al. 2020): a leg takes at most
+so much longer than the shortest one, and is found much sooner where many drones have to wait."""
 STATES_FOR_ONE: Final = 20_000
 """States that the search for one drone may expand."""
 
@@ -49,10 +52,11 @@ class FixedBookings:
 class PrioritisedPlanner:
     """Plans drones of one kind on one graph."""
 
-    def __init__(self, net: MotionNet, conflicts: Conflicts) -> None:
+    def __init__(self, net: MotionNet, conflicts: Conflicts, weight: float = WEIGHT) -> None:
         self._net = net
         self._conflicts = conflicts
         self.distances = Distances(net)
+        self.weight = weight
 
     def plan(
         self,
@@ -74,7 +78,7 @@ class PrioritisedPlanner:
 
     def sipp(self, table: ReservationTable) -> Sipp:
         """A search in a table."""
-        return Sipp(self._net, self.distances, table)
+        return Sipp(self._net, self.distances, table, self.weight)
 
     def book(self, table: ReservationTable, request: Request, plan: Plan) -> None:
         """Take what a plan takes, the end of it for good."""

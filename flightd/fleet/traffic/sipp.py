@@ -51,17 +51,20 @@ class Effort:
 class Sipp:
     """Searches over one net of motions and one table of reservations."""
 
-    def __init__(self, net: MotionNet, distances: Distances, table: ReservationTable) -> None:
+    def __init__(
+        self, net: MotionNet, distances: Distances, table: ReservationTable, weight: float = 1.0
+    ) -> None:
         self._net = net
+        self._weight = weight
         self._distances = distances
         self._table = table
 
     def legs(self, configuration: int, at_ms: int, goal: Stop, effort: Effort) -> Iterator[Leg]:
         """Ways from rest at `at_ms` to the goal, done there, the earliest first: one for each safe interval in
         which it ends.  A goal without dwelling is one to stay at for good."""
-        yield from _Search(self._net, self._table, self._distances.to(goal.vertex), goal, effort).run(
-            configuration, at_ms
-        )
+        rest_ms = self._distances.to(goal.vertex)
+        search = _Search(self._net, self._table, rest_ms, goal, effort, self._weight)
+        yield from search.run(configuration, at_ms)
 
 
 class _Search:
@@ -69,7 +72,7 @@ class _Search:
     motion); configuration -1 is the goal, done."""
 
     def __init__(
-        self, net: MotionNet, table: ReservationTable, rest_ms: Sequence[int], goal: Stop, effort: Effort
+        self, net: MotionNet, table: ReservationTable, rest_ms: Sequence[int], goal: Stop, effort: Effort, weight: float
     ) -> None:
         self._net = net
         self._table = table
@@ -79,6 +82,7 @@ class _Search:
         self._states: list[_State] = []
         self._queue: list[tuple[int, int, int, int, int, int, int, Motion | None]] = []
         self._tie = 0
+        self._weight = weight
         self._from_rest_ms = net.launch_ms + net.stop_ms if net.ramps_fit else 0
         self._from_move_ms = net.stop_ms
         self._below = net.lanes.vertices[goal.vertex].node
@@ -92,7 +96,7 @@ class _Search:
         if safe is None:
             return
         self._push(configuration, at_ms, safe[1], -1, None)
-        closed: set[tuple[int, int]] = set()
+        closed: dict[tuple[int, int], int] = {}
         passed: dict[int, list[Interval]] = {}
         done: set[int] = set()
         queue, states, take = self._queue, self._states, self._effort.take
@@ -104,9 +108,9 @@ class _Search:
                     yield self._traced(before, low, motion)
                 continue
             if not here & 1:
-                if (here, high) in closed:
+                if closed.get((here, high), NEVER) <= low:
                     continue
-                closed.add((here, high))
+                closed[here, high] = low
             else:
                 seen = passed.setdefault(here, [])
                 if any(a <= low and high <= b for a, b in seen):
@@ -187,7 +191,7 @@ class _Search:
             elif self._vertices[configuration >> 3].node != self._below:
                 left_ms += self._from_rest_ms
         self._tie += 1
-        item = (low + left_ms, -low, self._tie, configuration, low, high, before, motion)
+        item = (low + int(self._weight * left_ms), -low, self._tie, configuration, low, high, before, motion)
         heapq.heappush(self._queue, item)
 
     def _traced(self, number: int, end_ms: int, last: Motion | None) -> Leg:
