@@ -280,7 +280,7 @@ class TrafficControl:
 
     def _rebuild(self) -> None:
         courses = {
-            drone: Course(course.place, course.done, course.ahead) for drone, course in self.drones.items()
+            drone: Course(course.place, course.done, tuple(course.ahead)) for drone, course in self.drones.items()
         }
         self._graph = ActionGraph(courses, self.conflicts)
 

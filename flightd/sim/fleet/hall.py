@@ -6,7 +6,7 @@ import itertools
 import string
 
 from flightd.site.layout import lay_out
-from flightd.site.site import Aisle, Pad, Rack, Side, Site
+from flightd.site.site import Aisle, Pad, Rack, Site
 
 SPACING_M = 2.0
 _PITCH_M = 4.0
@@ -21,26 +21,30 @@ def aisle_names(count: int) -> list[str]:
 
 
 def fleet_hall(aisles: int, nodes: int, pads: int) -> Site:
-    """`nodes` of each aisle face its shelves; beyond them lie a cross at either end, and a spur with room for a
-    pad.  At most two pads an aisle."""
+    """`aisles` of `nodes` each, and between them dock aisles without shelves, spread over the hall: one for two
+    pads, which lie beyond the crosses at its ends."""
     names = aisle_names(aisles)
-    last = nodes + 4
-    steps = (_SPUR_M, *([SPACING_M] * (nodes + 1)), _SPUR_M)
-    rows = [
-        Aisle(name, 0.0, i * _PITCH_M, steps, shelf_distance_m=1.4, shelf_height_m=5.0, shelves=tuple(Side))
-        for i, name in enumerate(names)
-    ]
+    docks = [f"D{name}" for name in aisle_names(26 + (pads + 1) // 2)[26:]]
+    rows = list(names)
+    for i, dock in reversed(list(enumerate(docks))):
+        rows.insert((2 * i + 1) * aisles // (2 * len(docks)), dock)
+    steps = (SPACING_M,) * (nodes + 1)
+    laid: list[Aisle] = []
+    for row, name in enumerate(rows):
+        if name in docks:
+            laid.append(Aisle(name, -_SPUR_M, row * _PITCH_M, (_SPUR_M, *steps, _SPUR_M), shelves=()))
+        else:
+            laid.append(Aisle(name, 0.0, row * _PITCH_M, steps, shelf_distance_m=1.4, shelf_height_m=5.0))
+    ends = {name: (2, nodes + 3) if name in docks else (1, nodes + 2) for name in rows}
     crosses = [
-        (f"{a}{at}", f"{b}{at}") for a, b in itertools.pairwise(names) for at in (2, last - 1)
+        (f"{a}{ends[a][end]}", f"{b}{ends[b][end]}") for a, b in itertools.pairwise(rows) for end in (0, 1)
     ]
-    ends = [f"{name}{at}" for at in (1, last) for name in names]
-    places = [ends[i * len(ends) // pads] for i in range(pads)]
-    racks = [Rack(tuple(names), SPACING_M, _LEVELS_M, positions=2)]
+    places = [f"{dock}{at}" for at in (1, nodes + 4) for dock in docks][:pads]
     return lay_out(
         f"hall of {aisles} aisles",
-        rows,
+        laid,
         crosses,
         [Pad(f"P{i}", place, 0.6) for i, place in enumerate(places, start=1)],
         ceiling_m=7.0,
-        racks=racks,
+        racks=[Rack(tuple(names), SPACING_M, _LEVELS_M, positions=2)],
     )

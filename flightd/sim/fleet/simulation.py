@@ -142,7 +142,7 @@ class FleetSimulation:
             self.control.enter(drone.name, pad)
         for name in rng.sample(sorted(self.world.drones), min(scenario.failing, scenario.drones)):
             self.world.drones[name].fails_after_s = rng.uniform(600.0, 2400.0)
-        aisle = rng.choice(self.site.aisles)
+        aisle = rng.choice([aisle for aisle in self.site.aisles if aisle.shelves])
         nodes = [node.id for node in self.site.aisle_nodes(aisle.id)][1:-1]
         self._closing = dict(zip(nodes, nodes[1:], strict=False))
         self._closed_name = aisle.id
