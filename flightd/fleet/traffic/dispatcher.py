@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from flightd.fleet.traffic.distances import Distances
-from flightd.fleet.traffic.motions import NEVER
+from flightd.fleet.traffic.motions import NEVER, Act
 from flightd.fleet.traffic.plan import Action, Stop
 from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.traffic.work_queue import TourTimes, WorkQueue
@@ -108,8 +108,8 @@ class Dispatcher:
         drone, course = report.drone, self.control.drones[report.drone]
         self._charge[drone] = report.charge
         vertices = self.control.lanes.vertices
-        for stop in self.control.done(drone, report.done, now_ms):
-            node = vertices[stop.vertex].node
+        for vertex in self.control.done(drone, report.done, now_ms):
+            node = vertices[vertex].node
             self._tours.get(drone, set()).discard(node)
             self.queue.finish(node)
         if course.failed:
@@ -128,7 +128,9 @@ class Dispatcher:
         lanes = self.control.lanes
         for drone, nodes in self._tours.items():
             course = self.control.drones[drone]
-            kept = {lanes.vertices[stop.vertex].node for stop in course.stops}
+            counts = (action.vertex for action in course.base if action.act is Act.COUNT)
+            visits = (*(stop.vertex for stop in course.stops), *counts)
+            kept = {lanes.vertices[vertex].node for vertex in visits}
             lost = nodes - kept
             if lost:
                 for node in lost:

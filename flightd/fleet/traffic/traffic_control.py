@@ -84,17 +84,17 @@ class TrafficControl:
         self.drones[drone] = DroneCourse(place, quarter, ends=(place,))
         self._rebuild()
 
-    def done(self, drone: str, number: int, now_ms: int) -> list[Stop]:
-        """The first `number` actions of a drone's life are done.  Returns the stops that were visited."""
+    def done(self, drone: str, number: int, now_ms: int) -> list[int]:
+        """The first `number` actions of a drone's life are done.  Returns the vertices at which it counted."""
         course = self.drones[drone]
-        visited: list[Stop] = []
+        visited: list[int] = []
         while course.done < min(number, course.released):
             action = course.ahead.pop(0)
             course.done += 1
             course.place, course.quarter, course.since_ms = action.vertex, action.quarter, now_ms
             if action.act is Act.COUNT:
-                visited.append(next(stop for stop in course.stops if stop.vertex == action.vertex))
-                course.stops = tuple(stop for stop in course.stops if stop is not visited[-1])
+                visited.append(action.vertex)
+                course.stops = tuple(stop for stop in course.stops if stop.vertex != action.vertex)
         return visited
 
     def release(self, now_ms: int, limit_ms: Mapping[str, int] | None = None) -> dict[str, list[Action]]:
