@@ -125,7 +125,9 @@ class ActionGraph:
                     ready.append(then)
         if len(order) < len(missing):
             stuck = sorted(drone for drone, number in missing.keys() - set(order))
-            raise CyclicDependenciesError(f"{', '.join(dict.fromkeys(stuck))} wait for each other in a circle")
+            raise CyclicDependenciesError(
+                f"{', '.join(dict.fromkeys(stuck))} wait for each other in a circle"
+            )
         return tuple(order)
 
     def projected(
@@ -152,6 +154,4 @@ class ActionGraph:
 
 
 def _at(action: Action, start_ms: int, end_ms: int) -> Action:
-    return Action(
-        action.act, action.resource, action.vertex, action.quarter, start_ms, end_ms, action.moving
-    )
+    return Action(action.act, action.resource, action.vertex, action.quarter, start_ms, end_ms, action.moving)

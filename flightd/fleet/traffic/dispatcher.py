@@ -17,6 +17,7 @@ _DOUBT_LASTS_MS: Final = 20_000
 _PATIENCE_MS: Final = 45_000
 """Who waits so long for others is planned anew."""
 _RETRY_MS: Final = 15_000
+_TRIES: Final = 4
 _SPARE_FRAC: Final = 0.25
 """Of a tour's time: kept for delays."""
 _SLOWER: Final = 1.15
@@ -72,6 +73,7 @@ class Dispatcher:
         self._next_try_ms: dict[str, int] = {}
         self._avoided: set[str] = set()
         self._held: set[str] = set()
+        self._tries: dict[str, int] = {}
         self._shut: dict[str, str] = {}
         self.holding = 0
 
@@ -122,6 +124,14 @@ class Dispatcher:
             self._held |= set(self.control.fail(drone, now_ms, air))
             self._held.discard(drone)
             self._settle_tours()
+            near = self._near(drone)
+            self.queue.hand_back([node for node in self.queue.open if node in near], f"{drone} failed there")
+
+    def _near(self, drone: str) -> set[str]:
+        """The nodes over which nobody flies on account of a drone that failed."""
+        lanes = self.control.lanes
+        air = self.control.avoided(drone)
+        return {node for node, column in lanes.column_of.items() if column in air}
 
     def _settle_tours(self) -> None:
         """Hand back what drones do not visit any more."""
@@ -206,17 +216,25 @@ class Dispatcher:
         busy = {self.queue.work(node).aisle for node in self.queue.given}
         nodes = self.queue.tour(self._times(course.place), budget_ms, busy)
         while nodes:
-            stops = [self._stop(node) for node in nodes]
-            if not self.control.give(drone, stops, (course.place,), now_ms):
-                return False
+            if not self.control.give(drone, [self._stop(node) for node in nodes], (course.place,), now_ms):
+                self._refused(nodes)
+                nodes = nodes[: len(nodes) // 2]
+                continue
             flight_ms = course.ahead[-1].end_ms - course.ahead[0].start_ms
             if flight_ms <= left_ms / (1 + _SPARE_FRAC):
                 self.queue.take(drone, nodes)
                 self._tours.setdefault(drone, set()).update(nodes)
                 return True
-            nodes = nodes[: len(nodes) * 3 // 4]
             self.control.give(drone, (), (course.place,), now_ms)
+            nodes = nodes[: len(nodes) * 3 // 4]
         return False
+
+    def _refused(self, nodes: Sequence[str]) -> None:
+        """Tell of a node to which there is no way, once that was so several times."""
+        if len(nodes) == 1:
+            tries = self._tries[nodes[0]] = self._tries.get(nodes[0], 0) + 1
+            if tries >= _TRIES:
+                self.queue.hand_back(nodes, "there is no way there")
 
     def _stop(self, node: str) -> Stop:
         lanes = self.control.lanes

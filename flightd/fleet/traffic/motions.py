@@ -103,9 +103,7 @@ class MotionNet:
         found = [
             self._turn(vertex, quarter, wanted) for wanted in self._straight[vertex] if wanted != quarter
         ]
-        found += [
-            self._upright(arc, quarter) for arc in self.lanes.arcs[vertex] if arc.quarter == UPRIGHT
-        ]
+        found += [self._upright(arc, quarter) for arc in self.lanes.arcs[vertex] if arc.quarter == UPRIGHT]
         return (*found, *self._runs(vertex, quarter))
 
     def _runs(self, vertex: int, quarter: int) -> Iterator[Motion]:
@@ -152,7 +150,9 @@ class MotionNet:
             act, seconds = Act.TAKE_OFF, p.take_off_s + p.leg_s(arc.length_m - vertices[arc.to].height_m)
         else:
             act, seconds = Act.CLIMB, p.climb_s(arc.length_m)
-        return Motion(at_rest(arc.to, quarter), _ms(seconds), (Part(act, arc.resource, arc.to, 0, _ms(seconds)),))
+        return Motion(
+            at_rest(arc.to, quarter), _ms(seconds), (Part(act, arc.resource, arc.to, 0, _ms(seconds)),)
+        )
 
     def _cruise(self, arc: Arc, quarter: int) -> Motion:
         duration_ms = _ms(arc.length_m / self.pace.speed_mps)

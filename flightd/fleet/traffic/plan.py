@@ -65,7 +65,9 @@ def actions_of(motion: Motion, start_ms: int) -> list[Action]:
     ]
 
 
-def occupancy(actions: Sequence[Action], place: int, from_ms: int, until_ms: int) -> list[tuple[int, int, int]]:
+def occupancy(
+    actions: Sequence[Action], place: int, from_ms: int, until_ms: int
+) -> list[tuple[int, int, int]]:
     """(resource, from, to) of everything that a drone takes which stands on the vertex `place` from `from_ms`
     on, flies its actions, and stands at their end until `until_ms`."""
     taken: list[tuple[int, int, int]] = []

@@ -72,7 +72,13 @@ class _Search:
     motion); configuration -1 is the goal, done."""
 
     def __init__(
-        self, net: MotionNet, table: ReservationTable, rest_ms: Sequence[int], goal: Stop, effort: Effort, weight: float
+        self,
+        net: MotionNet,
+        table: ReservationTable,
+        rest_ms: Sequence[int],
+        goal: Stop,
+        effort: Effort,
+        weight: float,
     ) -> None:
         self._net = net
         self._table = table

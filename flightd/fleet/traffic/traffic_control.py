@@ -123,9 +123,7 @@ class TrafficControl:
     def _is_free(self, drone: str, number: int, action: Action, zones: Mapping[str, frozenset[int]]) -> bool:
         if any(action.resource in zone for other, zone in zones.items() if other != drone):
             return False
-        return all(
-            self.drones[other].done > its for other, its in self._graph.waits_for((drone, number))
-        )
+        return all(self.drones[other].done > its for other, its in self._graph.waits_for((drone, number)))
 
     def _zones(self) -> dict[str, frozenset[int]]:
         """The grown cells of the drones whose position is doubted."""
@@ -280,7 +278,8 @@ class TrafficControl:
 
     def _rebuild(self) -> None:
         courses = {
-            drone: Course(course.place, course.done, tuple(course.ahead)) for drone, course in self.drones.items()
+            drone: Course(course.place, course.done, tuple(course.ahead))
+            for drone, course in self.drones.items()
         }
         self._graph = ActionGraph(courses, self.conflicts)
 
@@ -305,6 +304,10 @@ class TrafficControl:
             if any(action.resource in air for action in course.tail)
         }
         return self._replan(met, projected, now_ms)
+
+    def avoided(self, drone: str) -> frozenset[int]:
+        """Where nobody is planned on account of this drone."""
+        return self._avoided.get(drone, frozenset())
 
     def close(self, resources: Collection[int], now_ms: int) -> tuple[str, ...]:
         """Nobody enters these any more; who is in there leaves.  Returns those for which there is no way."""
