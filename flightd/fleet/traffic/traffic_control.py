@@ -16,6 +16,7 @@ from flightd.fleet.traffic.action_graph import ActionGraph, Course
 from flightd.fleet.traffic.cells import CellSize, Conflicts, conflicts_of, within
 from flightd.fleet.traffic.lanes import LaneGraph
 from flightd.fleet.traffic.motions import NEVER, Act, MotionNet, at_rest
+from flightd.fleet.traffic.pibt import Pushed, plan_by_pushing
 from flightd.fleet.traffic.plan import Action, Plan, Stop, occupancy
 from flightd.fleet.traffic.prioritised import FixedBookings, PrioritisedPlanner
 from flightd.fleet.traffic.tours import Request
@@ -207,11 +208,32 @@ class TrafficControl:
                 continue
             if not planned.without:
                 break
+            if not holding and (pushed := self._pushed(projected, now_ms)):
+                for drone in pushed:
+                    self.drones[drone].stops = ()
+                self._adopt(projected, pushed)
+                return ()
             holding |= set(planned.without)
             todo |= holding | self._met_by(holding, projected)
         plans = {**planned.plans, **{drone: Plan(()) for drone in holding}}
         self._adopt(projected, plans)
         return tuple(sorted(holding))
+
+    def _pushed(self, projected: Mapping[str, Sequence[Action]], now_ms: int) -> dict[str, Plan] | None:
+        """Everybody sent home by PIBT, whatever they had ahead."""
+        wrecks = {
+            other for course in self.drones.values() for r in course.wreck for other in self.conflicts[r]
+        }
+        flying = [drone for drone, course in self.drones.items() if not course.failed]
+        shut, inside = self._shut(flying)
+        drones: list[Pushed] = []
+        for drone in flying:
+            request = self._request(drone, projected, now_ms)
+            base = tuple(action.resource for action in self.drones[drone].base)
+            avoided = frozenset(inside.get(drone, shut) | wrecks)
+            end = request.ends[0]
+            drones.append(Pushed(drone, request.configuration, request.at_ms, end, base, avoided))
+        return plan_by_pushing(self.net, self.conflicts, self._planner.distances, drones)
 
     def _met_by(self, holding: Collection[str], projected: Mapping[str, Sequence[Action]]) -> set[str]:
         """Who would pass where one of these drones holds."""
