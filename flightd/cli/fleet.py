@@ -68,10 +68,10 @@ def sim(
 def _in_words(d: dict[str, object]) -> list[str]:
     lines = [
         f"{d['drones']} drones, {d['aisles']} aisles, seed {d['seed']}: {d['verdict']}",
-        f"{d['counted']} of {d['places']} places counted in {_hours(d['end_s'])}, {d['places_per_hour']:g} an hour,"
-        f" {_hours(d['flown_s'])} in the air",
-        f"shared cells {d['shared_cells']}, deadlocks {d['deadlocks']}, below the reserve {d['below_reserve']},"
-        f" places without an answer {d['unanswered']}",
+        f"{d['counted']} of {d['places']} places counted in {_hours(d['end_s'])},"
+        f" {d['places_per_hour']:g} an hour, {_hours(d['flown_s'])} in the air",
+        f"shared cells {d['shared_cells']}, deadlocks {d['deadlocks']},"
+        f" below the reserve {d['below_reserve']}, places without an answer {d['unanswered']}",
         f"least distance of two drones {d['least_distance_m']} m, least charge {d['least_charge']},"
         f" planned {d['replans']} times",
     ]

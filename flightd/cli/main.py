@@ -30,8 +30,8 @@ from flightd.cli.exits import run_app
 
 app = application("flightd")
 for command in (
-    detect, evaluate, codes, bench, train_colour, sim, calibrate, plan, run, ground, fleet, doctor, report, replay,
-    log, keygen, site_map, inventory, guide,
+    detect, evaluate, codes, bench, train_colour, sim, calibrate, plan, run, ground, fleet, doctor, report,
+    replay, log, keygen, site_map, inventory, guide,
 ):  # fmt: skip
     command.register(app)
 

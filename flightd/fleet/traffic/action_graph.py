@@ -1,10 +1,11 @@
-"""The action-dependency graph: in which order drones take the resources that they share, whatever time it is.
+"""The action-dependency graph: in which order drones take the resources that they share, whatever time it
+is.
 
-W. Hönig, S. Kiesel, A. Tinka, J. W. Durham and N. Ayanian, "Persistent and Robust Execution of MAPF Schedules
-in Warehouses", RA-L 2019.  A drone begins an action when its own one before is done, and all actions of others
-that had a conflicting resource before it in the plans.  Who is late then delays others and meets nobody.
-As long as the graph has no cycle some drone can always go on: there is no deadlock.  That it has none follows
-from plans without conflicts, and is checked whenever a graph is made.
+W. Hönig, S. Kiesel, A. Tinka, J. W. Durham and N. Ayanian, "Persistent and Robust Execution of MAPF
+Schedules in Warehouses", RA-L 2019.  A drone begins an action when its own one before is done, and all
+actions of others that had a conflicting resource before it in the plans.  Who is late then delays others
+and meets nobody. As long as the graph has no cycle some drone can always go on: there is no deadlock.  That
+it has none follows from plans without conflicts, and is checked whenever a graph is made.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ class ConflictingPlansError(FlightdError):
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """What a drone has ahead: it stands (or is under way from) the vertex `place`; `actions` are numbered from
-    `first` on, those before it are done."""
+    """What a drone has ahead: it stands (or is under way from) the vertex `place`; `actions` are numbered
+    from `first` on, those before it are done."""
 
     place: int
     first: int
@@ -133,9 +134,9 @@ class ActionGraph:
     def projected(
         self, now_ms: int, done: Mapping[str, int], ends_ms: Mapping[ActionKey, int]
     ) -> dict[str, list[Action]]:
-        """The actions that are not done (`done` has the number of each drone's first one), at the times that come
-        of the order alone, from now on, when each takes as long as planned; `ends_ms` has when those that were
-        begun will be done."""
+        """The actions that are not done (`done` has the number of each drone's first one), at the times
+        that come of the order alone, from now on, when each takes as long as planned; `ends_ms` has when
+        those that were begun will be done."""
         ends: dict[ActionKey, int] = {}
         found: dict[str, list[Action]] = {drone: [] for drone in self._courses}
         for key in self.order:

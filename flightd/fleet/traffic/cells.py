@@ -1,8 +1,9 @@
 """Which resources conflict: those whose cells meet when two drones are on them.
 
-The cell of a drone is an upright cylinder around its middle: half its size, a clearance, and what its position
-is uncertain by.  Two resources conflict where their boxes come nearer to each other than two cells reach, both
-across and upwards; so a crossing, a swap and two nodes that lie too close are all the same conflict.
+The cell of a drone is an upright cylinder around its middle: half its size, a clearance, and what its
+position is uncertain by.  Two resources conflict where their boxes come nearer to each other than two cells
+reach, both across and upwards; so a crossing, a swap and two nodes that lie too close are all the same
+conflict.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ _ROWS = 256
 @dataclass(frozen=True, slots=True)
 class CellSize:
     """`body_m` is the drone across, propellers included; `clearance_m` is kept around it; its position is
-    uncertain by `uncertainty_m` at most.  Cells that are `upright_m` above each other do not meet: below that,
-    the wash of the upper drone disturbs the lower one."""
+    uncertain by `uncertainty_m` at most.  Cells that are `upright_m` above each other do not meet: below
+    that, the wash of the upper drone disturbs the lower one."""
 
     body_m: float = 0.6
     clearance_m: float = 0.15
@@ -59,7 +60,8 @@ def conflicts_of(lanes: LaneGraph, cell: CellSize) -> Conflicts:
 
 
 def within(lanes: LaneGraph, resources: Sequence[int], reach_m: float, upright_m: float) -> frozenset[int]:
-    """The resources that come nearer than `reach_m` across, and `upright_m` upwards, to one of `resources`."""
+    """The resources that come nearer than `reach_m` across, and `upright_m` upwards, to one of
+    `resources`."""
     boxes = _array(lanes.boxes)
     found: set[int] = set()
     for resource in resources:

@@ -1,5 +1,5 @@
-"""Keeps a fleet at work: gives tours that fit the batteries, hears what drones report, and answers with what each
-may fly next.  Pure: a step from reports to commands."""
+"""Keeps a fleet at work: gives tours that fit the batteries, hears what drones report, and answers with
+what each may fly next.  Pure: a step from reports to commands."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _SLOWER: Final = 1.15
 
 @dataclass(frozen=True, slots=True)
 class Endurance:
-    """`flight_s` in the air from full to empty, `charge_s` on a pad from empty to full; nobody flies below the
-    share `reserve`."""
+    """`flight_s` in the air from full to empty, `charge_s` on a pad from empty to full; nobody flies below
+    the share `reserve`."""
 
     flight_s: float = 1500.0
     charge_s: float = 1800.0
@@ -136,7 +136,7 @@ class Dispatcher:
     def _settle_tours(self) -> None:
         """Hand back what drones do not visit any more."""
         lanes = self.control.lanes
-        for drone, nodes in self._tours.items():
+        for drone, nodes in list(self._tours.items()):
             course = self.control.drones[drone]
             counts = (action.vertex for action in course.base if action.act is Act.COUNT)
             visits = (*(stop.vertex for stop in course.stops), *counts)
@@ -145,7 +145,7 @@ class Dispatcher:
             if lost:
                 for node in lost:
                     self.queue.hand_back([node], self._shut.get(node, ""))
-                nodes &= kept
+                self._tours[drone] = nodes & kept
 
     def _watch(self, drone: str, now_ms: int) -> None:
         """Home in time, round who is in doubt for long, another way for who waits for long."""
@@ -158,7 +158,7 @@ class Dispatcher:
                 self._held |= set(self.control.avoid(drone, now_ms))
                 self._settle_tours()
             return
-        if course.ahead and course.stops and self._is_short(drone, now_ms):
+        if course.ahead and course.stops and self._is_short(drone):
             course.stops = ()
             self._replanned([drone], now_ms)
         if course.base or not self.control.waits(drone):
@@ -167,7 +167,7 @@ class Dispatcher:
             self._waits_since_ms.pop(drone)
             self._replanned([drone], now_ms)
 
-    def _is_short(self, drone: str, now_ms: int) -> bool:
+    def _is_short(self, drone: str) -> bool:
         """Whether it has to leave out what it has left to count to be home with its reserve."""
         course = self.control.drones[drone]
         left_ms = self._endurance.left_ms(self._charge.get(drone, 1.0))
@@ -205,9 +205,9 @@ class Dispatcher:
             idle = not course.ahead and not course.failed and course.doubt_m <= 0.0
             if not idle or drone in self._held or self._charge.get(drone, 0.0) < self._endurance.starts_at:
                 continue
-            if self.queue.open and now_ms >= self._next_try_ms.get(drone, 0):
-                if not self._give_tour(drone, now_ms):
-                    self._next_try_ms[drone] = now_ms + _RETRY_MS
+            due = self.queue.open and now_ms >= self._next_try_ms.get(drone, 0)
+            if due and not self._give_tour(drone, now_ms):
+                self._next_try_ms[drone] = now_ms + _RETRY_MS
 
     def _give_tour(self, drone: str, now_ms: int) -> bool:
         course = self.control.drones[drone]

@@ -1,4 +1,5 @@
-"""How long a drone needs at least from everywhere to one vertex: what guides the search, kept for each goal."""
+"""How long a drone needs at least from everywhere to one vertex: what guides the search, kept for each
+goal."""
 
 from __future__ import annotations
 

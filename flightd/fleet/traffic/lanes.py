@@ -164,8 +164,8 @@ def _around(a: Vertex, b: Vertex) -> Box:
 
 
 def lanes_of(site: Site, levels_m: Sequence[float] = (1.5,)) -> LaneGraph:
-    """The lanes of a site for flight at `levels_m`, rising.  Lines that are blocked or closed by a keep-out at
-    a level have no lane there."""
+    """The lanes of a site for flight at `levels_m`, rising.  Lines that are blocked or closed by a keep-out
+    at a level have no lane there."""
     vertices: list[Vertex] = []
     at: dict[tuple[str, int], int] = {}
     for level, height_m in enumerate(levels_m):
@@ -182,9 +182,11 @@ def lanes_of(site: Site, levels_m: Sequence[float] = (1.5,)) -> LaneGraph:
                 lanes.append(_level_lane(vertices, a, b, edge.one_way))
     for level in range(1, len(levels_m)):
         low_m, high_m = levels_m[level - 1], levels_m[level]
-        for node in site.nodes.values():
-            if site.is_clear((node.x_m, node.y_m, low_m), (node.x_m, node.y_m, high_m)):
-                lanes.append(Lane(at[node.id, level - 1], at[node.id, level], high_m - low_m, UPRIGHT))
+        lanes += [
+            Lane(at[node.id, level - 1], at[node.id, level], high_m - low_m, UPRIGHT)
+            for node in site.nodes.values()
+            if site.is_clear((node.x_m, node.y_m, low_m), (node.x_m, node.y_m, high_m))
+        ]
     for pad in site.pads:
         x_m, y_m = site.pad_centre(pad)
         lanes.append(Lane(at[pad.node, 0], len(vertices), levels_m[0] + math.hypot(*pad.offset_m), UPRIGHT))

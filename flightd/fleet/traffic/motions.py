@@ -1,8 +1,9 @@
-"""How a drone moves on the lanes: turns, hops, launches, cruising, braking, each with the air it sweeps and when.
+"""How a drone moves on the lanes: turns, hops, launches, cruising, braking, each with the air it sweeps and
+when.
 
-A configuration is a vertex, a heading (quarter turn) and whether the drone is at rest there or at cruising speed.
-Speeds between are passed within a motion: what is flown is the trapezoid of bounded speed and acceleration.
-Times are whole milliseconds, rounded up, so that plans can be compared exactly.
+A configuration is a vertex, a heading (quarter turn) and whether the drone is at rest there or at cruising
+speed. Speeds between are passed within a motion: what is flown is the trapezoid of bounded speed and
+acceleration. Times are whole milliseconds, rounded up, so that plans can be compared exactly.
 """
 
 from __future__ import annotations

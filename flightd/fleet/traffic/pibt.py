@@ -1,9 +1,10 @@
 """Priority inheritance with backtracking: step by step, who is in the way of another is pushed on.
 
-K. Okumura, M. Machida, X. Défago and Y. Tamura, "Priority Inheritance with Backtracking for Iterative Multi-agent
-Path Finding", Artificial Intelligence 310, 2022.  Here it is what is left where prioritised planning finds no way:
-slow, for of two moves whose cells meet one is flown after the other, but it untangles what nobody can plan alone.
-Its steps become ordinary plans in time, so that they are flown in the same order as all others.
+K. Okumura, M. Machida, X. Défago and Y. Tamura, "Priority Inheritance with Backtracking for Iterative
+Multi-agent Path Finding", Artificial Intelligence 310, 2022.  Here it is what is left where prioritised
+planning finds no way: slow, for of two moves whose cells meet one is flown after the other, but it
+untangles what nobody can plan alone. Its steps become ordinary plans in time, so that they are flown in the
+same order as all others.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ STEPS_AT_MOST: Final = 600
 
 @dataclass(frozen=True, slots=True)
 class Pushed:
-    """A drone at rest in a configuration from `at_ms` on, with the vertex that it wants to; until then it may be on
-    the resources `base`.  It does not enter the resources `shut`."""
+    """A drone at rest in a configuration from `at_ms` on, with the vertex that it wants to; until then it
+    may be on the resources `base`.  It does not enter the resources `shut`."""
 
     drone: str
     configuration: int
@@ -37,8 +38,8 @@ class Pushed:
 def plan_by_pushing(
     net: MotionNet, conflicts: Conflicts, distances: Distances, drones: Sequence[Pushed]
 ) -> dict[str, Plan] | None:
-    """Plans that bring every drone to its goal, all on the vertices that they want at the same time; None where
-    that does not come about within the steps."""
+    """Plans that bring every drone to its goal, all on the vertices that they want at the same time; None
+    where that does not come about within the steps."""
     return _Pushing(net, conflicts, distances, drones).run()
 
 

@@ -24,8 +24,8 @@ from flightd.fleet.traffic.tours import Request, plan_tour
 
 _RAISED_AT_MOST: Final = 4
 WEIGHT: Final = 2.0
-"""Of the estimate against the time flown (bounded-suboptimal SIPP, K. Yakovlev et al. 2020): a leg takes at most
-so much longer than the shortest one, and is found much sooner where many drones have to wait."""
+"""Of the estimate against the time flown (bounded-suboptimal SIPP, K. Yakovlev et al. 2020): a leg takes at
+most so much longer than the shortest one, and is found much sooner where many drones have to wait."""
 STATES_FOR_ONE: Final = 20_000
 """States that the search for one drone may expand."""
 
@@ -108,7 +108,7 @@ class _Round:
         without: list[str] = []
         while queue:
             _, _, drone = heapq.heappop(queue)
-            plan = self._try(drone, self._table_for(drone))
+            plan: Plan | None = self._try(drone, self._table_for(drone))
             if plan is None and self._raised[drone] < _RAISED_AT_MOST:
                 plan, displaced = self._raise(drone)
                 for other in displaced:

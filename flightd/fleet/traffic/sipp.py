@@ -1,9 +1,10 @@
 """Safe-interval path planning: the earliest way of one drone between the reservations of all others.
 
-M. Phillips and M. Likhachev, "SIPP: Safe Interval Path Planning for Dynamic Environments", ICRA 2011.  A drone
-at cruising speed cannot wait, so that an early arrival there is not better than a late one: such states keep
-the interval of all their possible arrivals, as in Z. Ali and K. Yakovlev, "Safe Interval Path Planning with
-Kinodynamic Constraints" (SIPP-IP), AAAI 2023.  Both together are complete and optimal over the motions.
+M. Phillips and M. Likhachev, "SIPP: Safe Interval Path Planning for Dynamic Environments", ICRA 2011.  A
+drone at cruising speed cannot wait, so that an early arrival there is not better than a late one: such
+states keep the interval of all their possible arrivals, as in Z. Ali and K. Yakovlev, "Safe Interval Path
+Planning with Kinodynamic Constraints" (SIPP-IP), AAAI 2023.  Both together are complete and optimal over
+the motions.
 """
 
 from __future__ import annotations
@@ -60,8 +61,8 @@ class Sipp:
         self._table = table
 
     def legs(self, configuration: int, at_ms: int, goal: Stop, effort: Effort) -> Iterator[Leg]:
-        """Ways from rest at `at_ms` to the goal, done there, the earliest first: one for each safe interval in
-        which it ends.  A goal without dwelling is one to stay at for good."""
+        """Ways from rest at `at_ms` to the goal, done there, the earliest first: one for each safe interval
+        in which it ends.  A goal without dwelling is one to stay at for good."""
         rest_ms = self._distances.to(goal.vertex)
         search = _Search(self._net, self._table, rest_ms, goal, effort, self._weight)
         yield from search.run(configuration, at_ms)

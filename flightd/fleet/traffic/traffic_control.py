@@ -1,8 +1,9 @@
-"""Who may fly where now: plans, their order, what of them is released, and what happens when one does not go on.
+"""Who may fly where now: plans, their order, what of them is released, and what happens when one does not
+go on.
 
-What was released is a promise: a drone without a link flies it to its end and waits there.  Only what comes after
-it is ever planned anew, round all promises.  So the courses of all drones are free of conflicts at any time, and
-there is always one that can go on.
+What was released is a promise: a drone without a link flies it to its end and waits there.  Only what comes
+after it is ever planned anew, round all promises.  So the courses of all drones are free of conflicts at
+any time, and there is always one that can go on.
 """
 
 from __future__ import annotations
@@ -86,7 +87,8 @@ class TrafficControl:
         self._rebuild()
 
     def done(self, drone: str, number: int, now_ms: int) -> list[int]:
-        """The first `number` actions of a drone's life are done.  Returns the vertices at which it counted."""
+        """The first `number` actions of a drone's life are done.  Returns the vertices at which it
+        counted."""
         course = self.drones[drone]
         visited: list[int] = []
         while course.done < min(number, course.released):
@@ -99,8 +101,8 @@ class TrafficControl:
         return visited
 
     def release(self, now_ms: int, limit_ms: Mapping[str, int] | None = None) -> dict[str, list[Action]]:
-        """What each drone may do beyond what it was told: all that its predecessors are done for, as far as the
-        horizon.  `limit_ms`: no longer than that in all, where the battery does not reach further."""
+        """What each drone may do beyond what it was told: all that its predecessors are done for, as far as
+        the horizon.  `limit_ms`: no longer than that in all, where the battery does not reach further."""
         zones = self._zones()
         told: dict[str, list[Action]] = {}
         for drone, course in self.drones.items():
@@ -167,15 +169,15 @@ class TrafficControl:
         return self._graph.projected(now_ms, {drone: c.done for drone, c in self.drones.items()}, begun)
 
     def give(self, drone: str, stops: Sequence[Stop], ends: Sequence[int], now_ms: int) -> bool:
-        """Plan a drone's stops, and an end to stay on, round all others.  False, and nothing has changed, where
-        no way was found."""
+        """Plan a drone's stops, and an end to stay on, round all others.  False, and nothing has changed,
+        where no way was found."""
         course = self.drones[drone]
         old = course.stops, course.ends
         course.stops, course.ends = tuple(stops), tuple(ends)
         self.replans += 1
         projected = self.projected(now_ms)
         request = self._request(drone, projected, now_ms)
-        planned = self._planner.plan([request], self._fixed(projected, {drone}, (), now_ms))
+        planned = self._planner.plan([request], self._fixed(projected, {drone}, ()))
         if drone in planned.without:
             course.stops, course.ends = old
             return False
@@ -183,8 +185,8 @@ class TrafficControl:
         return True
 
     def replan(self, drones: Iterable[str], now_ms: int) -> tuple[str, ...]:
-        """Plan what is not released of these drones anew, all together.  Those for which there is no way, even
-        without stops, hold where their base ends, and are returned."""
+        """Plan what is not released of these drones anew, all together.  Those for which there is no way,
+        even without stops, hold where their base ends, and are returned."""
         return self._replan(set(drones), self.projected(now_ms), now_ms)
 
     def _replan(
@@ -198,7 +200,7 @@ class TrafficControl:
             course.stops = tuple(stop for stop in course.stops if stop.vertex not in shut)
         while True:
             self.replans += 1
-            fixed = self._fixed(projected, todo - holding, holding, now_ms)
+            fixed = self._fixed(projected, todo - holding, holding)
             requests = [self._request(drone, projected, now_ms) for drone in sorted(todo - holding)]
             planned = self._planner.plan(requests, fixed)
             stopless = [drone for drone in planned.without if self.drones[drone].stops]
@@ -263,7 +265,6 @@ class TrafficControl:
         projected: Mapping[str, Sequence[Action]],
         without: Collection[str],
         holding: Collection[str],
-        now_ms: int,
     ) -> FixedBookings:
         """What stays as it is while drones `without` are planned anew."""
         taken: list[tuple[str, int, int, int]] = []
@@ -306,8 +307,8 @@ class TrafficControl:
         self._graph = ActionGraph(courses, self.conflicts)
 
     def fail(self, drone: str, now_ms: int, air: Collection[int] = ()) -> tuple[str, ...]:
-        """A drone does not go on: where it may be (`air`, all that it was released to if that is not known) is
-        closed, others are planned round it.  Returns those for which there is no way."""
+        """A drone does not go on: where it may be (`air`, all that it was released to if that is not known)
+        is closed, others are planned round it.  Returns those for which there is no way."""
         projected = self.projected(now_ms)
         course = self.drones[drone]
         course.wreck = frozenset(air or course.air)

@@ -21,8 +21,8 @@ def aisle_names(count: int) -> list[str]:
 
 
 def fleet_hall(aisles: int, nodes: int, pads: int) -> Site:
-    """`aisles` of `nodes` each, and between them dock aisles without shelves, spread over the hall: one for two
-    pads, which lie beyond the crosses at its ends."""
+    """`aisles` of `nodes` each, and between them dock aisles without shelves, spread over the hall: one for
+    two pads, which lie beyond the crosses at its ends."""
     names = aisle_names(aisles)
     docks = [f"D{name}" for name in aisle_names(26 + (pads + 1) // 2)[26:]]
     rows = list(names)

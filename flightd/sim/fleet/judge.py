@@ -1,4 +1,5 @@
-"""Judges a fleet by the truth: shared cells, standstill, batteries, and whether every place has its answer."""
+"""Judges a fleet by the truth: shared cells, standstill, batteries, and whether every place has its
+answer."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -40,8 +41,8 @@ _HUB_STEPS: Final = 2
 
 @dataclass(frozen=True, slots=True)
 class FleetScenario:
-    """What is flown.  `failing` drones fail between shelves, each after a while of its own; one aisle is closed
-    from `closed_from` to `closed_to`, shares of the hours."""
+    """What is flown.  `failing` drones fail between shelves, each after a while of its own; one aisle is
+    closed from `closed_from` to `closed_to`, shares of the hours."""
 
     drones: int = 10
     aisles: int = 40
@@ -144,7 +145,7 @@ class FleetSimulation:
             self.world.drones[name].fails_after_s = rng.uniform(600.0, 2400.0)
         aisle = rng.choice([aisle for aisle in self.site.aisles if aisle.shelves])
         nodes = [node.id for node in self.site.aisle_nodes(aisle.id)][1:-1]
-        self._closing = dict(zip(nodes, nodes[1:], strict=False))
+        self._closing = dict(itertools.pairwise(nodes))
         self._closed_name = aisle.id
         self._unsent: dict[str, list[Action]] = {}
 
@@ -169,9 +170,9 @@ class FleetSimulation:
             at_s = steps * _STEP_S
             drones = list(self.world.drones.values())
             self.judge.see(at_s, drones, work_left=bool(self.queue.open or self.queue.given))
-            if not (self.queue.open or self.queue.given or closes):
-                if not any(self.world.flies(drone) for drone in drones):
-                    break
+            left = self.queue.open or self.queue.given or closes
+            if not left and not any(self.world.flies(drone) for drone in drones):
+                break
         return self._result(at_s, last_s)
 
     def _close(self, now_ms: int, *, shuts: bool) -> None:
@@ -196,7 +197,7 @@ class FleetSimulation:
     def _result(self, at_s: float, last_s: float) -> FleetResult:
         places = {node: len(self.queue.work(node).places) for node in self._nodes()}
         reasons = dict(self.queue.reasons)
-        left = [node for node in (*self.queue.open, *self.queue.given)]
+        left = (*self.queue.open, *self.queue.given)
         late = at_s >= self.scenario.hours * 3600.0
         flying = [drone for drone in self.world.drones.values() if not drone.failed]
         for node in left:
@@ -230,6 +231,6 @@ def fly_fleet(scenario: FleetScenario) -> FleetResult:
 
 
 def alone(scenario: FleetScenario) -> FleetScenario:
-    """The same hall and hours for one drone that nothing happens to but its own pace: what a fleet is compared
-    with."""
+    """The same hall and hours for one drone that nothing happens to but its own pace: what a fleet is
+    compared with."""
     return replace(scenario, drones=1, failing=0, closes_aisle=False)

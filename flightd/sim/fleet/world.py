@@ -71,8 +71,8 @@ class FleetDrone:
 
 
 class FleetWorld:
-    """Steps all drones; `draw_frac_per_s` of a battery is drawn in the air, `charge_frac_per_s` comes back on a
-    pad."""
+    """Steps all drones; `draw_frac_per_s` of a battery is drawn in the air, `charge_frac_per_s` comes back
+    on a pad."""
 
     def __init__(
         self,
@@ -145,7 +145,8 @@ class FleetWorld:
             drone.failed = drone.in_aisle_s >= drone.fails_after_s
 
     def _err(self, drone: FleetDrone, dt_s: float) -> None:
-        """A position error that wanders within what the cell allows for; in doubt as far as the doubt says."""
+        """A position error that wanders within what the cell allows for; in doubt as far as the doubt
+        says."""
         most_m = self._unknowns.error_m + drone.doubt_m
         pull = dt_s / _ERROR_TIME_S
         kick = most_m * math.sqrt(pull)
