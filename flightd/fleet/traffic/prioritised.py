@@ -124,8 +124,8 @@ class _Round:
         if drone not in self._fixed.closed_for:
             return self._shared
         table = self._planner.table(self._fixed, drone)
-        for other, plan in self._plans.items():
-            self._planner.book(table, self._requests[other], plan)
+        for other, theirs in self._plans.items():
+            self._planner.book(table, self._requests[other], theirs)
         return table
 
     def _raise(self, drone: str) -> tuple[Plan | None, list[str]]:
@@ -134,9 +134,9 @@ class _Round:
         self._raised[drone] += 1
         self._rank[drone] = min(self._rank.values()) - 1.0
         table = self._planner.table(self._fixed, drone)
-        for other, plan in self._plans.items():
+        for other, theirs in self._plans.items():
             if self._raised[other] >= self._raised[drone]:
-                self._planner.book(table, self._requests[other], plan)
+                self._planner.book(table, self._requests[other], theirs)
         plan = self._try(drone, table)
         if plan is None:
             return None, []
