@@ -22,6 +22,7 @@ from flightd.fleet.traffic.reservations import ALWAYS, Interval, ReservationTabl
 
 _State: TypeAlias = tuple[int, int, int, Motion | None]
 """Configuration, earliest arrival, number of the state before (-1: the start), motion from there."""
+_Queued: TypeAlias = tuple[int, int, int, int, int, int, int, Motion | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,30 +84,23 @@ class _Search:
     ) -> None:
         self._net = net
         self._table = table
-        self._rest_ms = rest_ms
         self._goal = goal
         self._effort = effort
         self._states: list[_State] = []
-        self._queue: list[tuple[int, int, int, int, int, int, int, Motion | None]] = []
+        self._queue: list[_Queued] = []
         self._tie = 0
-        self._weight = weight
-        self._from_rest_ms = net.launch_ms + net.stop_ms if net.ramps_fit else 0
-        self._from_move_ms = net.stop_ms
-        self._below = net.lanes.vertices[goal.vertex].node
-        self._vertices = net.lanes.vertices
+        self._best: dict[tuple[int, int], int] = {}
+        self._left_ms = _estimates(net, rest_ms, goal.vertex, weight)
 
     def run(self, configuration: int, at_ms: int) -> Iterator[Leg]:
-        vertex = configuration >> 3
-        if self._rest_ms[vertex] >= NEVER:
+        safe = _holding(self._table.free(configuration >> 3), at_ms)
+        if safe is None or self._left_ms[0][configuration >> 3] >= NEVER:
             return
-        safe = _holding(self._table.free(vertex), at_ms)
-        if safe is None:
-            return
-        self._push(configuration, at_ms, safe[1], -1, None)
-        closed: dict[tuple[int, int], int] = {}
+        self._arrive(configuration, at_ms, safe[1], -1, None)
         passed: dict[int, list[Interval]] = {}
         done: set[int] = set()
-        queue, states, take = self._queue, self._states, self._effort.take
+        goal_vertex = self._goal.vertex
+        queue, states, best, take = self._queue, self._states, self._best, self._effort.take
         while queue:
             _, _, _, here, low, high, before, motion = heapq.heappop(queue)
             if here < 0:
@@ -114,73 +108,94 @@ class _Search:
                     done.add(high)
                     yield self._traced(before, low, motion)
                 continue
-            if not here & 1:
-                if closed.get((here, high), NEVER) <= low:
-                    continue
-                closed[here, high] = low
-            else:
+            if here & 1:
                 seen = passed.setdefault(here, [])
                 if any(a <= low and high <= b for a, b in seen):
                     continue
                 seen.append((low, high))
+            elif best[here, high] < low:  # reached sooner since
+                continue
             if not take():
                 return
             states.append((here, low, before, motion))
-            number = len(states) - 1
-            if not here & 1 and here >> 3 == self._goal.vertex:
-                self._finish(here, low, high, number)
-            for onward in self._net.onward(here):
-                self._extend(onward, low, high, number)
+            if here >> 3 == goal_vertex and not here & 1:
+                self._finish(here, low, high)
+            self._expand(here, low, high)
 
-    def _finish(self, here: int, low: int, high: int, number: int) -> None:
+    def _finish(self, here: int, low: int, high: int) -> None:
         """The goal is reached: what is done there, or staying."""
         goal = self._goal
         if goal.dwell_ms <= 0:
             if high >= NEVER:
-                self._push(-1, low, high, number, None)
+                self._push(low, -1, low, high, None)
             return
         part = Part(Act.COUNT, goal.column, goal.vertex, 0, goal.dwell_ms)
         count = Motion(here, goal.dwell_ms, (part,))
-        for first, last in self._departures(count.parts, 0, low, high):
+        for first, _ in self._departures(count.parts, 0, low, high):
             ends = first + goal.dwell_ms
             safe = _holding(self._table.free(goal.vertex), ends)
-            if safe is not None and last >= first:
-                self._push(-1, ends, safe[1], number, count)
+            if safe is not None:
+                self._push(ends, -1, ends, safe[1], count)
 
-    def _extend(self, motion: Motion, low: int, high: int, number: int) -> None:
-        """Every safe arrival by one motion begun between `low` and `high`."""
-        target, duration_ms, parts = motion.target, motion.duration_ms, motion.parts
-        if self._rest_ms[target >> 3] >= NEVER:
-            return
-        if len(parts) == 1 and self._table.free(parts[0].resource) is ALWAYS:
-            departures: Sequence[Interval] = ((low, high),)
-        else:
-            departures = self._departures(parts, 0, low, high)
-        if target & 1:
-            for first, last in departures:
-                self._push(target, first + duration_ms, min(last + duration_ms, NEVER), number, motion)
-            return
+    def _expand(self, here: int, low: int, high: int) -> None:
+        """Every safe arrival by the motions that begin here between `low` and `high`."""
+        free_of = self._table.free
+        at_rest_ms, moving_ms = self._left_ms
+        for motion in self._net.onward(here):
+            target, duration_ms = motion.target, motion.duration_ms
+            vertex = target >> 3
+            if at_rest_ms[vertex] >= NEVER:
+                continue
+            free = free_of(motion.parts[0].resource)
+            departures: Sequence[Interval]
+            if free is ALWAYS and len(motion.parts) == 1:
+                departures = ((low, high),)
+            else:
+                departures = self._departures(motion.parts, 0, low, high)
+            if target & 1:
+                left_ms = moving_ms[vertex]
+                for first, last in departures:
+                    arrival = first + duration_ms
+                    latest = min(last + duration_ms, NEVER)
+                    self._push(arrival + left_ms, target, arrival, latest, motion)
+            elif departures:
+                self._rest(target, departures, motion)
+
+    def _rest(self, target: int, departures: Sequence[Interval], motion: Motion) -> None:
+        """Arrive at rest: in one safe interval only the earliest arrival matters, for it can wait."""
         free = self._table.free(target >> 3)
         reached = -1
         for first, _ in departures:
-            arrival = first + duration_ms
-            if arrival > reached:  # in the same safe interval the earlier arrival can wait
+            arrival = first + motion.duration_ms
+            if arrival > reached:
                 safe = _holding(free, arrival)
                 if safe is not None:
                     reached = safe[1]
-                    self._push(target, arrival, reached, number, motion)
+                    self._arrive(target, arrival, reached, len(self._states) - 1, motion)
+
+    def _arrive(self, target: int, arrival: int, until: int, before: int, motion: Motion | None) -> None:
+        key = target, until
+        if self._best.get(key, NEVER) <= arrival:
+            return
+        self._best[key] = arrival
+        left_ms = self._left_ms[0][target >> 3]
+        self._tie += 1
+        item = (arrival + left_ms, -arrival, self._tie, target, arrival, until, before, motion)
+        heapq.heappush(self._queue, item)
 
     def _departures(self, parts: Sequence[Part], i: int, low: int, high: int) -> list[Interval]:
         """The parts of low..high at which a motion may begin so that all it sweeps is free, rising."""
         part = parts[i]
+        in_ms, out_ms = part.in_ms, part.out_ms
         free = self._table.free(part.resource)
         found: list[Interval] = []
-        for k in range(max(bisect_right(free, (low + part.in_ms, NEVER + 1)) - 1, 0), len(free)):
-            starts, ends = free[k]
-            if starts - part.in_ms > high:
+        k = bisect_right(free, (low + in_ms, NEVER + 1)) - 1 if len(free) > 4 else 0
+        for starts, ends in free[k:] if k > 0 else free:
+            first = starts - in_ms
+            if first > high:
                 break
-            first = max(low, starts - part.in_ms)
-            last = high if ends >= NEVER else min(high, ends - part.out_ms)
+            first = max(first, low)
+            last = high if ends >= NEVER else min(high, ends - out_ms)
             if first <= last:
                 if i + 1 < len(parts):
                     found += self._departures(parts, i + 1, first, last)
@@ -188,17 +203,9 @@ class _Search:
                     found.append((first, last))
         return found
 
-    def _push(self, configuration: int, low: int, high: int, before: int, motion: Motion | None) -> None:
-        if configuration < 0:
-            left_ms = 0
-        else:
-            left_ms = self._rest_ms[configuration >> 3]
-            if configuration & 1:
-                left_ms += self._from_move_ms
-            elif self._vertices[configuration >> 3].node != self._below:
-                left_ms += self._from_rest_ms
+    def _push(self, estimate: int, configuration: int, low: int, high: int, motion: Motion | None) -> None:
         self._tie += 1
-        item = (low + int(self._weight * left_ms), -low, self._tie, configuration, low, high, before, motion)
+        item = (estimate, -low, self._tie, configuration, low, high, len(self._states) - 1, motion)
         heapq.heappush(self._queue, item)
 
     def _traced(self, number: int, end_ms: int, last: Motion | None) -> Leg:
@@ -228,3 +235,20 @@ def _holding(free: Sequence[Interval], at_ms: int) -> Interval | None:
     if k >= 0 and free[k][1] >= at_ms:
         return free[k]
     return None
+
+
+def _estimates(
+    net: MotionNet, rest_ms: Sequence[int], goal: int, weight: float
+) -> tuple[list[int], list[int]]:
+    """What is left from each vertex, at rest and moving, times `weight`; a stop and a launch are sure where the
+    goal is over another node."""
+    vertices = net.lanes.vertices
+    below = vertices[goal].node
+    stop_ms = net.stop_ms if net.ramps_fit else 0
+    both_ms = net.launch_ms + net.stop_ms if net.ramps_fit else 0
+    resting = [
+        NEVER if left >= NEVER else int(weight * (left if vertex.node == below else left + both_ms))
+        for left, vertex in zip(rest_ms, vertices, strict=True)
+    ]
+    moving = [NEVER if left >= NEVER else int(weight * (left + stop_ms)) for left in rest_ms]
+    return resting, moving
