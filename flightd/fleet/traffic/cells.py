@@ -19,7 +19,7 @@ from flightd.fleet.traffic.lanes import Box, LaneGraph
 Conflicts: TypeAlias = tuple[tuple[int, ...], ...]
 """For each resource those that conflict with it, itself among them, rising."""
 
-_ROWS = 256
+_ROWS = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +47,23 @@ class CellSize:
 def conflicts_of(lanes: LaneGraph, cell: CellSize) -> Conflicts:
     """The conflicts of all resources of a graph."""
     boxes = _array(lanes.boxes)
-    found: list[tuple[int, ...]] = []
+    found: list[tuple[int, ...]] = [()] * len(boxes)
+    by_y = np.argsort(boxes[:, 1], kind="stable")
     for first in range(0, len(boxes), _ROWS):
-        rows = boxes[first : first + _ROWS]
-        low = boxes[None, :, :3] - rows[:, None, 3:]
-        high = rows[:, None, :3] - boxes[None, :, 3:]
+        chosen = by_y[first : first + _ROWS]
+        rows = boxes[chosen]
+        reach_m = cell.separation_m
+        near = np.flatnonzero(
+            (boxes[:, 1] < rows[:, 4].max() + reach_m) & (boxes[:, 4] > rows[:, 1].min() - reach_m)
+        )
+        others = boxes[near]
+        low = others[None, :, :3] - rows[:, None, 3:]
+        high = rows[:, None, :3] - others[None, :, 3:]
         gap = np.maximum(np.maximum(low, high), 0.0)
         across = np.hypot(gap[..., 0], gap[..., 1])
-        meets = (across < cell.separation_m - 1e-9) & (gap[..., 2] < cell.upright_m - 1e-9)
-        found += [tuple(np.flatnonzero(row).tolist()) for row in meets]
+        meets = (across < reach_m - 1e-9) & (gap[..., 2] < cell.upright_m - 1e-9)
+        for row, resource in zip(meets, chosen.tolist(), strict=True):
+            found[resource] = tuple(near[row].tolist())
     return tuple(found)
 
 

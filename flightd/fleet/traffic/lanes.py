@@ -111,13 +111,19 @@ class LaneGraph:
         return (
             *(_around(vertex, vertex) for vertex in self.vertices),
             *(_around(self.vertices[lane.a], self.vertices[lane.b]) for lane in self.lanes),
-            *(self._column(node) for node in self._nodes),
+            *self._columns(),
         )
 
-    def _column(self, node: str) -> Box:
-        there = next(vertex for vertex in self.vertices if vertex.node == node and vertex.pad is None)
-        low_m, high_m = self._spans[node]
-        return Box(there.x_m, there.y_m, low_m, there.x_m, there.y_m, high_m)
+    def _columns(self) -> list[Box]:
+        """All the air over each node, from its lowest level to its highest."""
+        lowest: dict[str, Vertex] = {}
+        for vertex in self.vertices:
+            if vertex.pad is None:
+                lowest.setdefault(vertex.node, vertex)
+        return [
+            Box(there.x_m, there.y_m, self._spans[node][0], there.x_m, there.y_m, self._spans[node][1])
+            for node, there in lowest.items()
+        ]
 
     def over(self, node: str) -> int:
         """The vertex over a node at the lowest level.  KeyError where there is none."""
