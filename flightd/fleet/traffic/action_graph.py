@@ -132,11 +132,16 @@ class ActionGraph:
         return tuple(order)
 
     def projected(
-        self, now_ms: int, done: Mapping[str, int], ends_ms: Mapping[ActionKey, int]
+        self,
+        now_ms: int,
+        done: Mapping[str, int],
+        ends_ms: Mapping[ActionKey, int],
+        late_ms: Mapping[str, int],
     ) -> dict[str, list[Action]]:
         """The actions that are not done (`done` has the number of each drone's first one), at the times
-        that come of the order alone, from now on, when each takes as long as planned; `ends_ms` has when
-        those that were begun will be done."""
+        that come of the order alone, from now on, when each takes as long as planned.  `ends_ms` has when
+        those that were begun will be done, `late_ms` by how much a drone is expected to be late with its
+        first one."""
         ends: dict[ActionKey, int] = {}
         found: dict[str, list[Action]] = {drone: [] for drone in self._courses}
         for key in self.order:
@@ -145,7 +150,7 @@ class ActionGraph:
                 continue
             action = self.action(key)
             start_ms = max((ends.get(before, now_ms) for before in self.waits_for(key)), default=now_ms)
-            start_ms = max(start_ms, ends.get((drone, number - 1), now_ms))
+            start_ms = max(start_ms, ends.get((drone, number - 1), now_ms + late_ms.get(drone, 0)))
             end_ms = start_ms + action.duration_ms
             if key in ends_ms:
                 end_ms = max(ends_ms[key], start_ms + 1)

@@ -165,7 +165,8 @@ class Dispatcher:
             self._waits_since_ms.pop(drone, None)
         elif now_ms - self._waits_since_ms.setdefault(drone, now_ms) >= _PATIENCE_MS:
             self._waits_since_ms.pop(drone)
-            self._replanned([drone], now_ms)
+            self._held |= set(self.control.overtake(self.control.waits(drone), now_ms))
+            self._settle_tours()
 
     def _is_short(self, drone: str) -> bool:
         """Whether it has to leave out what it has left to count to be home with its reserve."""

@@ -30,6 +30,10 @@ class Action:
     end_ms: int
     moving: bool = False
 
+    def __post_init__(self) -> None:
+        if self.end_ms <= self.start_ms:
+            raise ValueError(f"an action from {self.start_ms} to {self.end_ms} ms takes no time")
+
     @property
     def duration_ms(self) -> int:
         return self.end_ms - self.start_ms

@@ -240,8 +240,8 @@ def _holding(free: Sequence[Interval], at_ms: int) -> Interval | None:
 def _estimates(
     net: MotionNet, rest_ms: Sequence[int], goal: int, weight: float
 ) -> tuple[list[int], list[int]]:
-    """What is left from each vertex, at rest and moving, times `weight`; a stop and a launch are sure where the
-    goal is over another node."""
+    """What is left from each vertex, at rest and moving, times `weight`; a stop and a launch are sure where
+    the goal is over another node."""
     vertices = net.lanes.vertices
     below = vertices[goal].node
     stop_ms = net.stop_ms if net.ramps_fit else 0

@@ -25,6 +25,8 @@ from flightd.mission.plan.leg_times import Pace
 
 HORIZON_MS: Final = 12_000
 """Actions are released until those that are not done last so long: what a drone flies without a link."""
+LATE_MS: Final = 90_000
+"""Who does not get on is expected to be so late."""
 
 
 @dataclass(slots=True)
@@ -43,6 +45,7 @@ class DroneCourse:
     wreck: frozenset[int] = frozenset()
     doubt_m: float = 0.0
     doubt_since_ms: int = 0
+    late_ms: int = 0
     priority: float = 0.0
 
     @property
@@ -94,6 +97,7 @@ class TrafficControl:
         while course.done < min(number, course.released):
             action = course.ahead.pop(0)
             course.done += 1
+            course.late_ms = 0
             course.place, course.quarter, course.since_ms = action.vertex, action.quarter, now_ms
             if action.act is Act.COUNT:
                 visited.append(action.vertex)
@@ -166,7 +170,9 @@ class TrafficControl:
             for drone, course in self.drones.items()
             if course.base
         }
-        return self._graph.projected(now_ms, {drone: c.done for drone, c in self.drones.items()}, begun)
+        done = {drone: course.done for drone, course in self.drones.items()}
+        late_ms = {drone: course.late_ms for drone, course in self.drones.items()}
+        return self._graph.projected(now_ms, done, begun, late_ms)
 
     def give(self, drone: str, stops: Sequence[Stop], ends: Sequence[int], now_ms: int) -> bool:
         """Plan a drone's stops, and an end to stay on, round all others.  False, and nothing has changed,
@@ -253,7 +259,7 @@ class TrafficControl:
     def _request(self, drone: str, projected: Mapping[str, Sequence[Action]], now_ms: int) -> Request:
         course = self.drones[drone]
         base = projected[drone][: len(course.base)]
-        place, quarter, at_ms = course.place, course.quarter, now_ms
+        place, quarter, at_ms = course.place, course.quarter, now_ms + course.late_ms
         if base:
             place, quarter, at_ms = base[-1].vertex, base[-1].quarter, base[-1].end_ms
         counted = {action.vertex for action in base if action.act is Act.COUNT}
@@ -334,12 +340,23 @@ class TrafficControl:
 
     def close(self, resources: Collection[int], now_ms: int) -> tuple[str, ...]:
         """Nobody enters these any more; who is in there leaves.  Returns those for which there is no way."""
-        self._closed |= frozenset(resources)
+        self._closed = self._closed | frozenset(resources) | self._enclosed(resources)
         vertices = {lane_end for r in resources for lane_end in self._ends(r)}
         for course in self.drones.values():
             if any(stop.vertex in vertices for stop in course.stops):
                 course.stops = tuple(stop for stop in course.stops if stop.vertex not in vertices)
         return self._replan_met(self.projected(now_ms), self._closed, now_ms)
+
+    def _enclosed(self, lanes: Collection[int]) -> set[int]:
+        """The vertices from which no other lanes lead than these, and the columns over them."""
+        arcs = self.lanes.arcs
+        inside = {
+            vertex
+            for lane in lanes
+            for vertex in self._ends(lane)
+            if all(arc.resource in lanes for arc in arcs[vertex])
+        }
+        return inside | {self.lanes.column_of[self.lanes.vertices[vertex].node] for vertex in inside}
 
     def _ends(self, resource: int) -> tuple[int, ...]:
         number = resource - len(self.lanes.vertices)
@@ -350,7 +367,7 @@ class TrafficControl:
 
     def open(self, resources: Collection[int]) -> None:
         """They may be flown again."""
-        self._closed -= frozenset(resources)
+        self._closed = self._closed - frozenset(resources) - self._enclosed(resources)
 
     def doubt(self, drone: str, doubt_m: float, now_ms: int) -> None:
         """A drone may be so far beside where it should be, beyond what its cell allows for; 0: it is sure."""
@@ -360,8 +377,36 @@ class TrafficControl:
         course.doubt_m = doubt_m if math.isfinite(doubt_m) else 0.0
         if doubt_m <= 0.0:
             self._avoided.pop(drone, None)
+            course.late_ms = 0
 
     def avoid(self, drone: str, now_ms: int) -> tuple[str, ...]:
-        """Plan others round the grown cell of a drone, until it is sure again."""
-        self._avoided[drone] = self._zones()[drone]
-        return self._replan_met(self.projected(now_ms), self._avoided[drone], now_ms)
+        """Plan others round the grown cell of a drone, until it is sure again, and before it where they would
+        wait for it."""
+        air = self._avoided[drone] = self._zones()[drone]
+        met = {
+            other
+            for other, course in self.drones.items()
+            if other != drone and any(action.resource in air for action in course.tail)
+        }
+        return self._replan(met | self._late(drone), self.projected(now_ms), now_ms)
+
+    def overtake(self, drones: Iterable[str], now_ms: int) -> tuple[str, ...]:
+        """Plan those anew who would wait for these drones, which do not get on."""
+        waiting = set().union(*(self._late(drone) for drone in drones))
+        return self._replan(waiting, self.projected(now_ms), now_ms)
+
+    def _late(self, drone: str) -> set[str]:
+        """Expect a drone to be late.  Returns who would wait for it."""
+        self.drones[drone].late_ms = LATE_MS
+        return {
+            other
+            for other, course in self.drones.items()
+            if other != drone and self._ever_waits(other, course, drone)
+        }
+
+    def _ever_waits(self, drone: str, course: DroneCourse, late: str) -> bool:
+        return any(
+            other == late and its >= self.drones[late].done
+            for number in range(course.released, course.done + len(course.ahead))
+            for other, its in self._graph.waits_for((drone, number))
+        )

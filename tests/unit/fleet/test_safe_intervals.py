@@ -97,7 +97,7 @@ def earliest_by_force(net: TinyNet, goal: int) -> int | None:
     return None
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(nets(), st.integers(1, VERTICES - 1))
 def test_the_first_leg_is_as_early_as_any_way_through_all_moments(net: TinyNet, goal: int) -> None:
     table = ReservationTable(tuple((i,) for i in range(VERTICES + LANES)))
@@ -128,5 +128,7 @@ def test_a_stop_is_done_only_where_there_is_time_for_it() -> None:
 
 def test_a_search_ends_when_its_effort_is_spent() -> None:
     motion = Motion(at_rest(1, 0), 2, (Part(Act.FLY, 4, 1, 0, 2),))
-    sipp = Sipp(cast(MotionNet, TinyNet({at_rest(0, 0): [motion]}, [])), NoGuide(), ReservationTable(((),) * 9))
+    sipp = Sipp(
+        cast(MotionNet, TinyNet({at_rest(0, 0): [motion]}, [])), NoGuide(), ReservationTable(((),) * 9)
+    )
     assert next(sipp.legs(at_rest(0, 0), 0, Stop(1, 1, 0), Effort(1)), None) is None
