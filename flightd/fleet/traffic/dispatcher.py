@@ -14,6 +14,8 @@ from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.traffic.work_queue import TourTimes, WorkQueue
 
 _DOUBT_LASTS_MS: Final = 20_000
+SILENT_MS: Final = 90_000
+"""Who is not heard for so long may not come back."""
 _PATIENCE_MS: Final = 45_000
 """Who waits so long for others is planned anew."""
 _RETRY_MS: Final = 15_000
@@ -72,6 +74,7 @@ class Dispatcher:
         self._waits_since_ms: dict[str, int] = {}
         self._next_try_ms: dict[str, int] = {}
         self._avoided: set[str] = set()
+        self._heard_ms: dict[str, int] = {}
         self._held: set[str] = set()
         self._tries: dict[str, int] = {}
         self._shut: dict[str, str] = {}
@@ -109,6 +112,9 @@ class Dispatcher:
     def _hear(self, report: DroneReport, now_ms: int) -> None:
         drone, course = report.drone, self.control.drones[report.drone]
         self._charge[drone] = report.charge
+        self._heard_ms[drone] = now_ms
+        if drone in self._avoided and not course.failed:
+            self.queue.retry(self._near(drone))
         vertices = self.control.lanes.vertices
         for vertex in self.control.done(drone, report.done, now_ms):
             node = vertices[vertex].node
@@ -157,6 +163,17 @@ class Dispatcher:
                 self._avoided.add(drone)
                 self._held |= set(self.control.avoid(drone, now_ms))
                 self._settle_tours()
+            return
+        silent_ms = now_ms - self._heard_ms.setdefault(drone, now_ms)
+        if silent_ms >= SILENT_MS and course.ahead and drone not in self._avoided:
+            self._avoided.add(drone)
+            course.stops = ()
+            self._held |= {*self.control.avoid(drone, now_ms), *self.control.replan([drone], now_ms)}
+            self._settle_tours()
+            near = self._near(drone)
+            self.queue.hand_back(
+                [node for node in self.queue.open if node in near], f"{drone} is silent there"
+            )
             return
         if course.ahead and course.stops and self._is_short(drone):
             course.stops = ()

@@ -134,13 +134,11 @@ class TrafficControl:
 
     def _zones(self) -> dict[str, frozenset[int]]:
         """The grown cells of the drones whose position is doubted."""
-        return {
-            drone: within(
-                self.lanes, course.air, self._cell.separation_m + course.doubt_m, self._cell.upright_m
-            )
-            for drone, course in self.drones.items()
-            if course.doubt_m > 0.0
-        }
+        return {drone: self._zone(course) for drone, course in self.drones.items() if course.doubt_m > 0.0}
+
+    def _zone(self, course: DroneCourse) -> frozenset[int]:
+        reach_m = self._cell.separation_m + course.doubt_m
+        return within(self.lanes, course.air, reach_m, self._cell.upright_m)
 
     def paused(self) -> frozenset[str]:
         """The drones that must stand where they are: in doubt themselves, or released into a grown cell that
@@ -380,9 +378,9 @@ class TrafficControl:
             course.late_ms = 0
 
     def avoid(self, drone: str, now_ms: int) -> tuple[str, ...]:
-        """Plan others round the grown cell of a drone, until it is sure again, and before it where they would
-        wait for it."""
-        air = self._avoided[drone] = self._zones()[drone]
+        """Plan others round all the air in which a drone may be, until it is heard and sure, and before it
+        where they would wait for it."""
+        air = self._avoided[drone] = self._zone(self.drones[drone])
         met = {
             other
             for other, course in self.drones.items()

@@ -116,10 +116,12 @@ class WorkQueue:
                     break
             for work in self._swept(works, nodes, times):
                 way_ms = times.between_ms(nodes[-1], work.node) if nodes else times.out_ms(work.node)
-                if way_ms + work.dwell_ms + times.home_ms(work.node) > left_ms or len(nodes) >= most:
+                fits = way_ms + work.dwell_ms + times.home_ms(work.node) <= left_ms
+                if fits:
+                    left_ms -= way_ms + work.dwell_ms
+                    nodes.append(work.node)
+                if nodes and (not fits or len(nodes) >= most):
                     return tuple(nodes)
-                left_ms -= way_ms + work.dwell_ms
-                nodes.append(work.node)
         return tuple(nodes)
 
     @staticmethod

@@ -44,8 +44,8 @@ CASES: Final = (BenchCase(20, 5, 9), BenchCase(100, 20, 24))
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """`setup_s` is spent once for a site; `plan_s` for all plans, `graph_s` for their order.  `alone_s` is the
-    longest flight of a drone that is alone: no plan of all is over sooner."""
+    """`setup_s` is spent once for a site; `plan_s` for all plans, `graph_s` for their order.  `alone_s` is
+    the longest flight of a drone that is alone: no plan of all is over sooner."""
 
     drones: int
     site_nodes: int
@@ -131,7 +131,16 @@ def as_table(measured: Sequence[Measured]) -> Table:
     from rich.table import Table  # noqa: PLC0415
 
     table = Table(title="Planning a fleet at once, processor time", title_justify="left")
-    for heading in ("drones", "nodes", "site, once", "plans", "order", "planned", "makespan", "longest alone"):
+    for heading in (
+        "drones",
+        "nodes",
+        "site, once",
+        "plans",
+        "order",
+        "planned",
+        "makespan",
+        "longest alone",
+    ):
         table.add_column(heading, justify="right")
     for each in measured:
         table.add_row(

@@ -41,8 +41,9 @@ _HUB_STEPS: Final = 2
 
 @dataclass(frozen=True, slots=True)
 class FleetScenario:
-    """What is flown.  `failing` drones fail between shelves, each after a while of its own; one aisle is
-    closed from `closed_from` to `closed_to`, shares of the hours."""
+    """What is flown.  `failing` drones fail between shelves after they counted for a time within `fails_s`,
+    each after a while of its own; one aisle is closed from `closed_from` to `closed_to`, shares of the
+    hours."""
 
     drones: int = 10
     aisles: int = 40
@@ -50,6 +51,7 @@ class FleetScenario:
     hours: float = 8.0
     seed: int = 1
     failing: int = 2
+    fails_s: tuple[float, float] = (600.0, 2400.0)
     closed_from: float = 0.05
     closed_to: float = 0.15
     closes_aisle: bool = True
@@ -142,11 +144,12 @@ class FleetSimulation:
             drone = self.world.add(f"drone-{i}", pad, f"{scenario.seed} {i}")
             self.control.enter(drone.name, pad)
         for name in rng.sample(sorted(self.world.drones), min(scenario.failing, scenario.drones)):
-            self.world.drones[name].fails_after_s = rng.uniform(600.0, 2400.0)
+            self.world.drones[name].fails_after_s = rng.uniform(*scenario.fails_s)
         aisle = rng.choice([aisle for aisle in self.site.aisles if aisle.shelves])
         nodes = [node.id for node in self.site.aisle_nodes(aisle.id)][1:-1]
         self._closing = dict(itertools.pairwise(nodes))
-        self._closed_name = aisle.id
+        self.closed_aisle = aisle.id
+        self.now_s = 0.0
         self._unsent: dict[str, list[Action]] = {}
 
     def run(self) -> FleetResult:
@@ -167,7 +170,7 @@ class FleetSimulation:
                     done, last_s = len(self.queue.done), at_s
             self.world.step(_STEP_S)
             steps += 1
-            at_s = steps * _STEP_S
+            at_s = self.now_s = steps * _STEP_S
             drones = list(self.world.drones.values())
             self.judge.see(at_s, drones, work_left=bool(self.queue.open or self.queue.given))
             left = self.queue.open or self.queue.given or closes
@@ -177,7 +180,7 @@ class FleetSimulation:
 
     def _close(self, now_ms: int, *, shuts: bool) -> None:
         if shuts:
-            self.dispatcher.shut(self._closing, f"aisle {self._closed_name} is closed", now_ms)
+            self.dispatcher.shut(self._closing, f"aisle {self.closed_aisle} is closed", now_ms)
         else:
             self.dispatcher.unshut(self._closing)
 
