@@ -25,7 +25,7 @@ def register(app: typer.Typer) -> None:
 def sim(
     drones: Annotated[int, typer.Option(min=1, max=50, help="How many fly.")] = 10,
     aisles: Annotated[int, typer.Option(min=2, max=100, help="Aisles with shelves.")] = 40,
-    nodes: Annotated[int, typer.Option(min=2, max=100, help="Nodes in each of them.")] = 25,
+    nodes: Annotated[int, typer.Option(min=2, max=100, help="Nodes in each of them.")] = 48,
     hours: Annotated[float, typer.Option(min=0.1, max=48.0, help="Simulated, at most.")] = 8.0,
     seed: Annotated[int, typer.Option(min=0, help="The same seed flies the same.")] = 1,
     failing: Annotated[int, typer.Option(min=0, max=50, help="Drones that fail between shelves.")] = 2,

@@ -22,6 +22,7 @@ _RETRY_MS: Final = 15_000
 _TRIES: Final = 4
 _SPARE_FRAC: Final = 0.25
 """Of a tour's time: kept for delays."""
+_SPARE_MS: Final = 45_000
 _SLOWER: Final = 1.15
 """What a flight takes beside what was planned, at most on average."""
 
@@ -88,6 +89,9 @@ class Dispatcher:
             self._watch(drone, now_ms)
         if self._held:
             self._unhold(now_ms)
+        if now_ms >= self._next_try_ms.get("urgent", 0):
+            self._next_try_ms["urgent"] = now_ms + _RETRY_MS
+            self._bring_home(now_ms)
         self._give_tours(now_ms)
         limits = {drone: self._limit_ms(drone) for drone in self.control.drones}
         return Commands(self.control.release(now_ms, limits), self.control.paused())
@@ -194,7 +198,25 @@ class Dispatcher:
             return False
         base_ms = sum(action.duration_ms for action in course.base)
         home_ms = min(self._distances.to(end)[at] for end in course.ends)
-        return left_ms < _SLOWER * (base_ms + home_ms) * (1 + _SPARE_FRAC) + 20_000
+        return left_ms < _SLOWER * (base_ms + home_ms) * (1 + _SPARE_FRAC) + _SPARE_MS
+
+    def _bring_home(self, now_ms: int) -> None:
+        """Let the drones whose way home, with all that they will wait for, leaves little of the battery go
+        before the others."""
+        urgent = False
+        flying: list[str] = []
+        for drone, actions in self.control.projected(now_ms).items():
+            if actions:
+                flying.append(drone)
+                left_ms = self._endurance.left_ms(self._charge.get(drone, 1.0))
+                in_air = self.control.lanes.vertices[self.control.drones[drone].place].pad is None
+                short = left_ms < _SLOWER * (actions[-1].end_ms - now_ms) + _SPARE_MS
+                if in_air and short and self.control.drones[drone].stops:
+                    self.control.drones[drone].stops = ()
+                    urgent = True
+                urgent |= in_air and short and bool(self.control.waits(drone))
+        if urgent:
+            self._replanned(flying, now_ms)
 
     def _limit_ms(self, drone: str) -> int:
         """A base ends before the way back from it takes more than what the battery has left."""

@@ -47,7 +47,7 @@ class FleetScenario:
 
     drones: int = 10
     aisles: int = 40
-    nodes: int = 25
+    nodes: int = 48
     hours: float = 8.0
     seed: int = 1
     failing: int = 2
