@@ -23,7 +23,7 @@ from flightd.fleet.traffic.sipp import Effort, Sipp
 from flightd.fleet.traffic.tours import Request, plan_tour
 
 _RAISED_AT_MOST: Final = 4
-WEIGHT: Final = 4.0
+WEIGHT: Final = 2.0
 """Of the estimate against the time flown (bounded-suboptimal SIPP, K. Yakovlev et al. 2020): a leg takes at
 most so much longer than the shortest one, and is found much sooner where many drones have to wait."""
 STATES_FOR_ONE: Final = 20_000

@@ -17,7 +17,7 @@ from flightd.fleet.traffic.cells import CellSize, conflicts_of
 from flightd.fleet.traffic.lanes import LaneGraph, lanes_of
 from flightd.fleet.traffic.motions import MotionNet, at_rest, vertex_of
 from flightd.fleet.traffic.plan import Stop
-from flightd.fleet.traffic.prioritised import PrioritisedPlanner
+from flightd.fleet.traffic.prioritised import WEIGHT, PrioritisedPlanner
 from flightd.fleet.traffic.tours import Request
 from flightd.sim.fleet.hall import fleet_hall
 from flightd.sim.fleet.simulation import PACE
@@ -35,10 +35,11 @@ class BenchCase:
     drones: int
     aisles: int
     nodes: int
+    weight: float = WEIGHT
     seed: int = 1
 
 
-CASES: Final = (BenchCase(20, 5, 9), BenchCase(100, 20, 24))
+CASES: Final = (BenchCase(20, 5, 10), BenchCase(100, 20, 25), BenchCase(100, 20, 25, 8.0))
 """About 200 and 2,000 nodes, those of the docks among them."""
 
 
@@ -48,6 +49,7 @@ class Measured:
     the longest flight of a drone that is alone: no plan of all is over sooner."""
 
     drones: int
+    weight: float
     site_nodes: int
     setup_s: float
     plan_s: float
@@ -61,6 +63,7 @@ class Measured:
         """As JSON has it."""
         return {
             "drones": self.drones,
+            "weight": self.weight,
             "nodes": self.site_nodes,
             "setup_s": round(self.setup_s, 3),
             "plan_s": round(self.plan_s, 3),
@@ -78,7 +81,7 @@ def measure(case: BenchCase) -> Measured:
     began_s = time.process_time()
     lanes = lanes_of(site)
     conflicts = conflicts_of(lanes, CellSize())
-    planner = PrioritisedPlanner(MotionNet(lanes, PACE), conflicts)
+    planner = PrioritisedPlanner(MotionNet(lanes, PACE), conflicts, case.weight)
     setup_s = time.process_time() - began_s
     requests = _requests(case, lanes, [node for node in site.nodes if _has_shelves(site.nodes[node].aisle)])
     began_s = time.process_time()
@@ -97,6 +100,7 @@ def measure(case: BenchCase) -> Measured:
     alone = [planner.plan([request]).plans[request.drone].end_ms for request in requests]
     return Measured(
         case.drones,
+        case.weight,
         len(site.nodes),
         setup_s,
         plan_s,
@@ -133,6 +137,7 @@ def as_table(measured: Sequence[Measured]) -> Table:
     table = Table(title="Planning a fleet at once, processor time", title_justify="left")
     for heading in (
         "drones",
+        "weight",
         "nodes",
         "site, once",
         "plans",
@@ -145,6 +150,7 @@ def as_table(measured: Sequence[Measured]) -> Table:
     for each in measured:
         table.add_row(
             str(each.drones),
+            f"{each.weight:g}",
             str(each.site_nodes),
             f"{each.setup_s:.2f} s",
             f"{each.plan_s:.2f} s",
