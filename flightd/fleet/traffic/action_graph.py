@@ -154,6 +154,7 @@ class ActionGraph:
             end_ms = start_ms + action.duration_ms
             if key in ends_ms:
                 end_ms = max(ends_ms[key], start_ms + 1)
+                start_ms = end_ms - action.duration_ms
             ends[key] = end_ms
             found[drone].append(_at(action, start_ms, end_ms))
         return found

@@ -118,7 +118,8 @@ class Dispatcher:
         self._charge[drone] = report.charge
         self._heard_ms[drone] = now_ms
         if drone in self._avoided and not course.failed:
-            self.queue.retry(self._near(drone))
+            counts = [action.vertex for action in course.base if action.act is Act.COUNT]
+            self.queue.retry(self._near(drone) - {self.control.lanes.vertices[c].node for c in counts})
         vertices = self.control.lanes.vertices
         for vertex in self.control.done(drone, report.done, now_ms):
             node = vertices[vertex].node
@@ -134,8 +135,13 @@ class Dispatcher:
             self._held |= set(self.control.fail(drone, now_ms, air))
             self._held.discard(drone)
             self._settle_tours()
-            near = self._near(drone)
-            self.queue.hand_back([node for node in self.queue.open if node in near], f"{drone} failed there")
+            self._hand_back_near(drone, f"{drone} failed there")
+
+    def _hand_back_near(self, drone: str, reason: str) -> None:
+        """What nobody counts on account of a drone: what lies near it, and what it was about to count."""
+        own = self._tours.pop(drone, set())
+        near = self._near(drone)
+        self.queue.hand_back([*own, *(node for node in self.queue.open if node in near)], reason)
 
     def _near(self, drone: str) -> set[str]:
         """The nodes over which nobody flies on account of a drone that failed."""
@@ -174,10 +180,7 @@ class Dispatcher:
             course.stops = ()
             self._held |= {*self.control.avoid(drone, now_ms), *self.control.replan([drone], now_ms)}
             self._settle_tours()
-            near = self._near(drone)
-            self.queue.hand_back(
-                [node for node in self.queue.open if node in near], f"{drone} is silent there"
-            )
+            self._hand_back_near(drone, f"{drone} is silent there")
             return
         if course.ahead and course.stops and self._is_short(drone):
             course.stops = ()

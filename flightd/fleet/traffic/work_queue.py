@@ -72,7 +72,8 @@ class WorkQueue:
         self._given.pop(node, None)
         self._open.pop(node, None)
         self.reasons.pop(node, None)
-        self.done.append(node)
+        if node not in self.done:
+            self.done.append(node)
 
     def hand_back(self, nodes: Iterable[str], reason: str = "") -> None:
         """They wait again, or are not to be done, for a reason."""
