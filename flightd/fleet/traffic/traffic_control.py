@@ -177,6 +177,7 @@ class TrafficControl:
         where no way was found."""
         course = self.drones[drone]
         old = course.stops, course.ends
+        course.late_ms = 0
         course.stops, course.ends = tuple(stops), tuple(ends)
         self.replans += 1
         projected = self.projected(now_ms)

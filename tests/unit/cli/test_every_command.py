@@ -86,7 +86,15 @@ COMMANDS = dict(
         *_walk(typer.main.get_command(flightctl_app), "flightctl"),
     ]
 )
-GROUPS = ("flightd", "flightctl", "flightd log", "flightd map", "flightd inventory", "flightd fleet", "flightd ground people")
+GROUPS = (
+    "flightd",
+    "flightctl",
+    "flightd log",
+    "flightd map",
+    "flightd inventory",
+    "flightd fleet",
+    "flightd ground people",
+)
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -227,6 +227,17 @@ def test_who_waits_for_a_drone_that_does_not_get_on_goes_first() -> None:
     assert floor.counted == ["A4"]
 
 
+def test_planning_anew_leaves_what_is_under_way_as_long_as_it_takes() -> None:
+    floor = Floor()
+    assert floor.give("d0", "A4", "A5")
+    floor.until("d0", "A4")
+    count = floor.control.drones["d0"].base[0]
+    floor.now_ms += 60_000
+    assert floor.control.replan(["d0"], floor.now_ms) == ()
+    after = floor.control.drones["d0"].base[0]
+    assert (after.act, after.duration_ms) == (Act.COUNT, count.duration_ms)
+
+
 def test_a_count_is_one_action_that_takes_all_the_air_over_its_node() -> None:
     floor = Floor()
     floor.give("d0", "B4")
