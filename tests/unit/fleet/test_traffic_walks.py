@@ -1,4 +1,4 @@
-"""Whatever happens to a fleet in whatever order: no released air meets, no graph has a circle, all come home."""
+"""Whatever happens to a fleet in whatever order: no released air meets, no graph has a circle, all land."""
 
 from __future__ import annotations
 
