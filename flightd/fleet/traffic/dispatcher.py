@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from flightd.fleet.traffic.distances import Distances
-from flightd.fleet.traffic.motions import NEVER, Act
+from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action, Stop
 from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.traffic.work_queue import TourTimes, WorkQueue
@@ -93,8 +93,7 @@ class Dispatcher:
             self._next_try_ms["urgent"] = now_ms + _RETRY_MS
             self._bring_home(now_ms)
         self._give_tours(now_ms)
-        limits = {drone: self._limit_ms(drone) for drone in self.control.drones}
-        return Commands(self.control.release(now_ms, limits), self.control.paused())
+        return Commands(self.control.release(now_ms, self._comes_home), self.control.paused())
 
     def shut(self, aisle_nodes: Mapping[str, str], reason: str, now_ms: int) -> None:
         """Close the lanes between these nodes (node to its next one)."""
@@ -221,13 +220,13 @@ class Dispatcher:
         if urgent:
             self._replanned(flying, now_ms)
 
-    def _limit_ms(self, drone: str) -> int:
-        """A base ends before the way back from it takes more than what the battery has left."""
+    def _comes_home(self, drone: str, vertex: int, after_ms: int) -> bool:
+        """Whether the battery brings a drone home from the end of a base; who is on the way home goes on."""
         course = self.control.drones[drone]
         if not course.stops:
-            return NEVER
-        left_ms = self._endurance.left_ms(self._charge.get(drone, 1.0))
-        return max(left_ms // 2, 0)
+            return True
+        home_ms = min(self._distances.to(end)[vertex] for end in course.ends)
+        return _SLOWER * (after_ms + home_ms) <= self._endurance.left_ms(self._charge.get(drone, 1.0))
 
     def _replanned(self, drones: Sequence[str], now_ms: int) -> None:
         for drone in drones:

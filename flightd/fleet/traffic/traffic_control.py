@@ -9,9 +9,9 @@ any time, and there is always one that can go on.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeAlias
 
 from flightd.fleet.traffic.action_graph import ActionGraph, Course
 from flightd.fleet.traffic.cells import CellSize, Conflicts, conflicts_of, within
@@ -23,6 +23,8 @@ from flightd.fleet.traffic.prioritised import FixedBookings, PrioritisedPlanner
 from flightd.fleet.traffic.tours import Request
 from flightd.mission.plan.leg_times import Pace
 
+ComesHome: TypeAlias = Callable[[str, int, int], bool]
+"""Whether a drone comes home with its reserve from a vertex that it reaches after so many milliseconds."""
 HORIZON_MS: Final = 12_000
 """Actions are released until those that are not done last so long: what a drone flies without a link."""
 LATE_MS: Final = 90_000
@@ -104,22 +106,23 @@ class TrafficControl:
                 course.stops = tuple(stop for stop in course.stops if stop.vertex != action.vertex)
         return visited
 
-    def release(self, now_ms: int, limit_ms: Mapping[str, int] | None = None) -> dict[str, list[Action]]:
+    def release(self, now_ms: int, comes_home: ComesHome | None = None) -> dict[str, list[Action]]:
         """What each drone may do beyond what it was told: all that its predecessors are done for, as far as
-        the horizon.  `limit_ms`: no longer than that in all, where the battery does not reach further."""
+        the horizon, and no further than it `comes_home` from."""
         zones = self._zones()
         told: dict[str, list[Action]] = {}
         for drone, course in self.drones.items():
             if course.failed or course.doubt_m > 0.0:
                 continue
-            left_ms = sum(action.duration_ms for action in course.base)
-            most_ms = min(HORIZON_MS, (limit_ms or {}).get(drone, NEVER))
+            base_ms = sum(action.duration_ms for action in course.base)
             fresh: list[Action] = []
             for number, action in enumerate(course.tail, start=course.released):
-                if left_ms >= most_ms or not self._is_free(drone, number, action, zones):
+                if base_ms >= HORIZON_MS or not self._is_free(drone, number, action, zones):
+                    break
+                base_ms += action.duration_ms
+                if comes_home is not None and not comes_home(drone, action.vertex, base_ms):
                     break
                 fresh.append(action)
-                left_ms += action.duration_ms
             if fresh:
                 if not course.base:
                     course.since_ms = now_ms

@@ -94,11 +94,21 @@ def test_a_base_reaches_no_further_than_the_horizon() -> None:
     assert floor.control.release(0) == {}
 
 
-def test_a_base_ends_where_the_battery_does_not_reach_further() -> None:
+def test_a_base_ends_where_the_drone_would_not_come_home_from() -> None:
     floor = Floor()
     floor.give("d0", "A3")
-    assert len(floor.control.release(0, {"d0": 1})["d0"]) == 1
-    assert floor.control.release(0, {"d0": 1}) == {}
+    pad, over_pad = floor.lanes.pads[0], floor.lanes.arcs[floor.lanes.pads[0]][0].to
+    asked: list[tuple[int, int]] = []
+
+    def comes_home(_drone: str, vertex: int, after_ms: int) -> bool:
+        asked.append((vertex, after_ms))
+        return vertex in {pad, over_pad}
+
+    told = floor.control.release(0, comes_home)["d0"]
+    assert {action.vertex for action in told} == {over_pad}
+    assert asked[-1][0] != over_pad
+    assert [after_ms for _, after_ms in asked] == sorted(after_ms for _, after_ms in asked)
+    assert floor.control.release(0, comes_home) == {}
     assert "d0" in floor.control.release(0)
 
 
