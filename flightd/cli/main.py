@@ -11,6 +11,7 @@ from flightd.cli import (
     detect,
     doctor,
     evaluate,
+    fleet,
     ground,
     guide,
     inventory,
@@ -31,8 +32,8 @@ from flightd.cli.exits import run_app
 
 app = application("flightd")
 for command in (
-    detect, evaluate, codes, bench, train_colour, sim, calibrate, plan, run, ground, doctor, report, replay,
-    study, log, keygen, site_map, inventory, store, guide,
+    detect, evaluate, codes, bench, train_colour, sim, calibrate, plan, run, ground, fleet, doctor, report,
+    replay, study, log, keygen, site_map, inventory, store, guide,
 ):  # fmt: skip
     command.register(app)
 

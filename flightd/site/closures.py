@@ -28,8 +28,7 @@ def mistakes(site: Site) -> Iterator[tuple[str, str]]:
                 key,
                 f"{pad.node} is cut off from {site.home.node} by [[blocked]] or [[keep_out]]; open a way",
             )
-        end = nearest_end(site, *site.pad_centre(pad), PAD_REACH_M)
-        if pad.sign is PadSign.LINE_END and end is None:
+        if pad.sign is PadSign.LINE_END and nearest_end(site, *site.pad_centre(pad), PAD_REACH_M) is None:
             yield (
                 f"pad[{i}] ({pad.id}).sign",
                 f'no painted line ends within {PAD_REACH_M} m of the pad; set offset_m, or sign = "mat"',

@@ -207,14 +207,16 @@ def _crosses(
 
 
 def _check_connected(nodes: dict[str, Node], edges: Sequence[Edge]) -> None:
+    beside: dict[str, list[str]] = {node: [] for node in nodes}
+    for edge in edges:
+        beside[edge.a].append(edge.b)
+        beside[edge.b].append(edge.a)
     reached = {next(iter(nodes))}
-    pending = list(edges)
-    while True:
-        rest = [edge for edge in pending if edge.a not in reached and edge.b not in reached]
-        if len(rest) == len(pending):
-            break
-        reached.update(node for edge in pending if edge not in rest for node in (edge.a, edge.b))
-        pending = rest
+    pending = list(reached)
+    while pending:
+        fresh = set(beside[pending.pop()]) - reached
+        reached |= fresh
+        pending += fresh
     cut_off = [node for node in nodes if node not in reached]
     if cut_off:
         aisle = nodes[cut_off[0]].aisle

@@ -30,6 +30,8 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd calibrate": ("none.jpg",),
     "flightd plan": ("--config", "none.toml"),
     "flightd run": ("--config", "none.toml"),
+    "flightd fleet sim": ("--drones", "0"),
+    "flightd fleet bench": ("surplus",),
     "flightd ground": ("--listen", "0.0.0.0"),
     "flightd ground people add": ("ann", "--role", "captain"),
     "flightd ground people list": ("surplus",),
@@ -92,7 +94,8 @@ COMMANDS = dict(
     ]
 )
 GROUPS = (
-    "flightd", "flightctl", "flightd log", "flightd map", "flightd inventory", "flightd ground people",
+    "flightd", "flightctl", "flightd log", "flightd map", "flightd inventory", "flightd fleet",
+    "flightd ground people",
     "flightd ground keys", "flightd store",
 )  # fmt: skip
 

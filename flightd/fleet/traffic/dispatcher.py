@@ -1,0 +1,296 @@
+"""Keeps a fleet at work: gives tours that fit the batteries, hears what drones report, and answers with
+what each may fly next.  Pure: a step from reports to commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from flightd.fleet.traffic.distances import Distances
+from flightd.fleet.traffic.motions import Act
+from flightd.fleet.traffic.plan import Action, Stop
+from flightd.fleet.traffic.traffic_control import TrafficControl
+from flightd.fleet.traffic.work_queue import TourTimes, WorkQueue
+
+_DOUBT_LASTS_MS: Final = 20_000
+SILENT_MS: Final = 90_000
+"""Who is not heard for so long may not come back."""
+_PATIENCE_MS: Final = 45_000
+"""Who waits so long for others is planned anew."""
+_RETRY_MS: Final = 15_000
+_TRIES: Final = 4
+_SPARE_FRAC: Final = 0.25
+"""Of a tour's time: kept for delays."""
+_SPARE_MS: Final = 45_000
+_SLOWER: Final = 1.15
+"""What a flight takes beside what was planned, at most on average."""
+
+
+@dataclass(frozen=True, slots=True)
+class Endurance:
+    """`flight_s` in the air from full to empty, `charge_s` on a pad from empty to full; nobody flies below
+    the share `reserve`."""
+
+    flight_s: float = 1500.0
+    charge_s: float = 1800.0
+    reserve: float = 0.15
+    starts_at: float = 0.9
+
+    def left_ms(self, charge: float) -> int:
+        """In the air, down to the reserve."""
+        return int((charge - self.reserve) * self.flight_s * 1000)
+
+
+@dataclass(frozen=True, slots=True)
+class DroneReport:
+    """What a drone tells: how many actions of its life are done, its charge, by how much its position is
+    doubted, and whether it is unable to fly on."""
+
+    drone: str
+    done: int
+    charge: float
+    doubt_m: float = 0.0
+    failed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """`base` is what each drone may fly on beyond what it was told; the `paused` stand where they are."""
+
+    base: Mapping[str, Sequence[Action]]
+    paused: frozenset[str]
+
+
+class Dispatcher:
+    """The fleet of one floor."""
+
+    def __init__(self, control: TrafficControl, queue: WorkQueue, endurance: Endurance) -> None:
+        self.control = control
+        self.queue = queue
+        self._endurance = endurance
+        self._distances = Distances(control.net)
+        self._charge: dict[str, float] = {}
+        self._tours: dict[str, set[str]] = {}
+        self._waits_since_ms: dict[str, int] = {}
+        self._next_try_ms: dict[str, int] = {}
+        self._avoided: set[str] = set()
+        self._heard_ms: dict[str, int] = {}
+        self._held: set[str] = set()
+        self._tries: dict[str, int] = {}
+        self._shut: dict[str, str] = {}
+        self.holding = 0
+
+    def step(self, now_ms: int, reports: Iterable[DroneReport]) -> Commands:
+        """Take what drones reported since the last step, those without a link left out."""
+        for report in reports:
+            self._hear(report, now_ms)
+        for drone in self.control.drones:
+            self._watch(drone, now_ms)
+        if self._held:
+            self._unhold(now_ms)
+        if now_ms >= self._next_try_ms.get("urgent", 0):
+            self._next_try_ms["urgent"] = now_ms + _RETRY_MS
+            self._bring_home(now_ms)
+        self._give_tours(now_ms)
+        return Commands(self.control.release(now_ms, self._comes_home), self.control.paused())
+
+    def shut(self, aisle_nodes: Mapping[str, str], reason: str, now_ms: int) -> None:
+        """Close the lanes between these nodes (node to its next one)."""
+        lanes = self.control.lanes.lanes_between(aisle_nodes.items())
+        self._held |= set(self.control.close(lanes, now_ms))
+        nodes = {*aisle_nodes, *aisle_nodes.values()}
+        self._shut |= dict.fromkeys(nodes, reason)
+        self._settle_tours()
+        self.queue.hand_back([node for node in self.queue.open if node in nodes], reason)
+
+    def unshut(self, aisle_nodes: Mapping[str, str]) -> None:
+        """Open them again."""
+        self.control.open(self.control.lanes.lanes_between(aisle_nodes.items()))
+        nodes = {*aisle_nodes, *aisle_nodes.values()}
+        for node in nodes:
+            self._shut.pop(node, None)
+        self.queue.retry(nodes)
+
+    def _hear(self, report: DroneReport, now_ms: int) -> None:
+        drone, course = report.drone, self.control.drones[report.drone]
+        self._charge[drone] = report.charge
+        self._heard_ms[drone] = now_ms
+        if drone in self._avoided and not course.failed:
+            counts = [action.vertex for action in course.base if action.act is Act.COUNT]
+            self.queue.retry(self._near(drone) - {self.control.lanes.vertices[c].node for c in counts})
+        vertices = self.control.lanes.vertices
+        for vertex in self.control.done(drone, report.done, now_ms):
+            node = vertices[vertex].node
+            self._tours.get(drone, set()).discard(node)
+            self.queue.finish(node)
+        if course.failed:
+            return
+        self.control.doubt(drone, report.doubt_m, now_ms)
+        if report.doubt_m <= 0.0:
+            self._avoided.discard(drone)
+        if report.failed:
+            air = [course.place, *(action.resource for action in course.base[:1])]
+            self._held |= set(self.control.fail(drone, now_ms, air))
+            self._held.discard(drone)
+            self._settle_tours()
+            self._hand_back_near(drone, f"{drone} failed there")
+
+    def _hand_back_near(self, drone: str, reason: str) -> None:
+        """What nobody counts on account of a drone: what lies near it, and what it was about to count."""
+        own = self._tours.pop(drone, set())
+        near = self._near(drone)
+        self.queue.hand_back([*own, *(node for node in self.queue.open if node in near)], reason)
+
+    def _near(self, drone: str) -> set[str]:
+        """The nodes over which nobody flies on account of a drone that failed."""
+        lanes = self.control.lanes
+        air = self.control.avoided(drone)
+        return {node for node, column in lanes.column_of.items() if column in air}
+
+    def _settle_tours(self) -> None:
+        """Hand back what drones do not visit any more."""
+        lanes = self.control.lanes
+        for drone, nodes in list(self._tours.items()):
+            course = self.control.drones[drone]
+            counts = (action.vertex for action in course.base if action.act is Act.COUNT)
+            visits = (*(stop.vertex for stop in course.stops), *counts)
+            kept = {lanes.vertices[vertex].node for vertex in visits}
+            lost = nodes - kept
+            if lost:
+                for node in lost:
+                    self.queue.hand_back([node], self._shut.get(node, ""))
+                self._tours[drone] = nodes & kept
+
+    def _watch(self, drone: str, now_ms: int) -> None:
+        """Home in time, round who is in doubt for long, another way for who waits for long."""
+        course = self.control.drones[drone]
+        if course.failed:
+            return
+        if course.doubt_m > 0.0:
+            if drone not in self._avoided and now_ms - course.doubt_since_ms >= _DOUBT_LASTS_MS:
+                self._avoided.add(drone)
+                self._held |= set(self.control.avoid(drone, now_ms))
+                self._settle_tours()
+            return
+        silent_ms = now_ms - self._heard_ms.setdefault(drone, now_ms)
+        if silent_ms >= SILENT_MS and course.ahead and drone not in self._avoided:
+            self._avoided.add(drone)
+            course.stops = ()
+            self._held |= {*self.control.avoid(drone, now_ms), *self.control.replan([drone], now_ms)}
+            self._settle_tours()
+            self._hand_back_near(drone, f"{drone} is silent there")
+            return
+        if course.ahead and course.stops and self._is_short(drone):
+            course.stops = ()
+            self._replanned([drone], now_ms)
+        if course.base or not self.control.waits(drone):
+            self._waits_since_ms.pop(drone, None)
+        elif now_ms - self._waits_since_ms.setdefault(drone, now_ms) >= _PATIENCE_MS:
+            self._waits_since_ms.pop(drone)
+            self._held |= set(self.control.overtake(self.control.waits(drone), now_ms))
+            self._settle_tours()
+
+    def _is_short(self, drone: str) -> bool:
+        """Whether it has to leave out what it has left to count to be home with its reserve."""
+        course = self.control.drones[drone]
+        left_ms = self._endurance.left_ms(self._charge.get(drone, 1.0))
+        at = course.base[-1].vertex if course.base else course.place
+        if self.control.lanes.vertices[course.place].pad is not None:
+            return False
+        base_ms = sum(action.duration_ms for action in course.base)
+        home_ms = min(self._distances.to(end)[at] for end in course.ends)
+        return left_ms < _SLOWER * (base_ms + home_ms) * (1 + _SPARE_FRAC) + _SPARE_MS
+
+    def _bring_home(self, now_ms: int) -> None:
+        """Let the drones whose way home, with all that they will wait for, leaves little of the battery go
+        before the others."""
+        urgent = False
+        flying: list[str] = []
+        for drone, actions in self.control.projected(now_ms).items():
+            if actions:
+                flying.append(drone)
+                left_ms = self._endurance.left_ms(self._charge.get(drone, 1.0))
+                in_air = self.control.lanes.vertices[self.control.drones[drone].place].pad is None
+                short = left_ms < _SLOWER * (actions[-1].end_ms - now_ms) + _SPARE_MS
+                if in_air and short and self.control.drones[drone].stops:
+                    self.control.drones[drone].stops = ()
+                    urgent = True
+                urgent |= in_air and short and bool(self.control.waits(drone))
+        if urgent:
+            self._replanned(flying, now_ms)
+
+    def _comes_home(self, drone: str, vertex: int, after_ms: int) -> bool:
+        """Whether the battery brings a drone home from the end of a base; who is on the way home goes on."""
+        course = self.control.drones[drone]
+        if not course.stops:
+            return True
+        home_ms = min(self._distances.to(end)[vertex] for end in course.ends)
+        return _SLOWER * (after_ms + home_ms) <= self._endurance.left_ms(self._charge.get(drone, 1.0))
+
+    def _replanned(self, drones: Sequence[str], now_ms: int) -> None:
+        for drone in drones:
+            self.control.drones[drone].priority = 1.0 - self._charge.get(drone, 1.0)
+        self._held |= set(self.control.replan(drones, now_ms))
+        self._settle_tours()
+
+    def _unhold(self, now_ms: int) -> None:
+        """Try again for those for which there was no way."""
+        if now_ms >= self._next_try_ms.get("", 0):
+            self._next_try_ms[""] = now_ms + _RETRY_MS
+            held, self._held = sorted(self._held), set()
+            self.holding += 1
+            self._replanned(held, now_ms)
+
+    def _give_tours(self, now_ms: int) -> None:
+        for drone, course in self.control.drones.items():
+            idle = not course.ahead and not course.failed and course.doubt_m <= 0.0
+            if not idle or drone in self._held or self._charge.get(drone, 0.0) < self._endurance.starts_at:
+                continue
+            due = self.queue.open and now_ms >= self._next_try_ms.get(drone, 0)
+            if due and not self._give_tour(drone, now_ms):
+                self._next_try_ms[drone] = now_ms + _RETRY_MS
+
+    def _give_tour(self, drone: str, now_ms: int) -> bool:
+        course = self.control.drones[drone]
+        left_ms = self._endurance.left_ms(self._charge[drone])
+        budget_ms = int(left_ms / (_SLOWER * (1 + _SPARE_FRAC)))
+        busy = {self.queue.work(node).aisle for node in self.queue.given}
+        nodes = self.queue.tour(self._times(course.place), budget_ms, busy)
+        while nodes:
+            if not self.control.give(drone, [self._stop(node) for node in nodes], (course.place,), now_ms):
+                self._refused(nodes)
+                nodes = nodes[: len(nodes) // 2]
+                continue
+            flight_ms = course.ahead[-1].end_ms - course.ahead[0].start_ms
+            if flight_ms <= left_ms / (1 + _SPARE_FRAC):
+                self.queue.take(drone, nodes)
+                self._tours.setdefault(drone, set()).update(nodes)
+                return True
+            self.control.give(drone, (), (course.place,), now_ms)
+            nodes = nodes[: len(nodes) * 3 // 4]
+        return False
+
+    def _refused(self, nodes: Sequence[str]) -> None:
+        """Tell of a node to which there is no way, once that was so several times."""
+        if len(nodes) == 1:
+            tries = self._tries[nodes[0]] = self._tries.get(nodes[0], 0) + 1
+            if tries >= _TRIES:
+                self.queue.hand_back(nodes, "there is no way there")
+
+    def _stop(self, node: str) -> Stop:
+        lanes = self.control.lanes
+        return Stop(lanes.over(node), lanes.column_of[node], self.queue.work(node).dwell_ms)
+
+    def _times(self, pad: int) -> TourTimes:
+        lanes, distances, net = self.control.lanes, self._distances, self.control.net
+        stop_ms = net.launch_ms + net.stop_ms
+        home = distances.to(pad)
+
+        def between_ms(a: str, b: str) -> int:
+            return distances.to(lanes.over(b))[lanes.over(a)] + stop_ms
+
+        def out_ms(node: str) -> int:
+            return distances.to(lanes.over(node))[pad] + 4 * stop_ms
+
+        return TourTimes(out_ms, between_ms, lambda node: home[lanes.over(node)] + 4 * stop_ms)

@@ -1,0 +1,414 @@
+"""Who may fly where now: plans, their order, what of them is released, and what happens when one does not
+go on.
+
+What was released is a promise: a drone without a link flies it to its end and waits there.  Only what comes
+after it is ever planned anew, round all promises.  So the courses of all drones are free of conflicts at
+any time, and there is always one that can go on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, TypeAlias
+
+from flightd.fleet.traffic.action_graph import ActionGraph, Course
+from flightd.fleet.traffic.cells import CellSize, Conflicts, conflicts_of, within
+from flightd.fleet.traffic.lanes import LaneGraph
+from flightd.fleet.traffic.motions import NEVER, Act, MotionNet, at_rest
+from flightd.fleet.traffic.pibt import Pushed, plan_by_pushing
+from flightd.fleet.traffic.plan import Action, Plan, Stop, occupancy
+from flightd.fleet.traffic.prioritised import FixedBookings, PrioritisedPlanner
+from flightd.fleet.traffic.tours import Request
+from flightd.mission.plan.leg_times import Pace
+
+ComesHome: TypeAlias = Callable[[str, int, int], bool]
+"""Whether a drone comes home with its reserve from a vertex that it reaches after so many milliseconds."""
+HORIZON_MS: Final = 12_000
+"""Actions are released until those that are not done last so long: what a drone flies without a link."""
+LATE_MS: Final = 90_000
+"""Who does not get on is expected to be so late."""
+
+
+@dataclass(slots=True)
+class DroneCourse:
+    """One drone: `done` of its actions are done, `released` are released, both counted over its whole life;
+    `ahead` are those that are not done.  `stops` are left to be visited."""
+
+    place: int
+    quarter: int = 0
+    done: int = 0
+    released: int = 0
+    since_ms: int = 0
+    ahead: list[Action] = field(default_factory=list)
+    stops: tuple[Stop, ...] = ()
+    ends: tuple[int, ...] = ()
+    wreck: frozenset[int] = frozenset()
+    doubt_m: float = 0.0
+    doubt_since_ms: int = 0
+    late_ms: int = 0
+    priority: float = 0.0
+
+    @property
+    def failed(self) -> bool:
+        """It does not fly any more; `wreck` is where it may be."""
+        return bool(self.wreck)
+
+    @property
+    def base(self) -> list[Action]:
+        """Released and not done."""
+        return self.ahead[: self.released - self.done]
+
+    @property
+    def tail(self) -> list[Action]:
+        """Not released."""
+        return self.ahead[self.released - self.done :]
+
+    @property
+    def air(self) -> list[int]:
+        """Every resource on which the drone may be now, for all that is known."""
+        return [self.place, *(action.resource for action in self.base)]
+
+
+class TrafficControl:
+    """The traffic on one floor.  Times are milliseconds from any one origin."""
+
+    def __init__(self, lanes: LaneGraph, pace: Pace, cell: CellSize) -> None:
+        self.lanes = lanes
+        self.net = MotionNet(lanes, pace)
+        self.conflicts: Conflicts = conflicts_of(lanes, cell)
+        self._cell = cell
+        self._planner = PrioritisedPlanner(self.net, self.conflicts)
+        self.drones: dict[str, DroneCourse] = {}
+        self._closed: frozenset[int] = frozenset()
+        self._avoided: dict[str, frozenset[int]] = {}
+        self._graph = ActionGraph({}, self.conflicts)
+        self.replans = 0
+
+    def enter(self, drone: str, place: int, quarter: int = 0) -> None:
+        """A drone that stands on a vertex of its own, usually a pad."""
+        self.drones[drone] = DroneCourse(place, quarter, ends=(place,))
+        self._rebuild()
+
+    def done(self, drone: str, number: int, now_ms: int) -> list[int]:
+        """The first `number` actions of a drone's life are done.  Returns the vertices at which it
+        counted."""
+        course = self.drones[drone]
+        visited: list[int] = []
+        while course.done < min(number, course.released):
+            action = course.ahead.pop(0)
+            course.done += 1
+            course.late_ms = 0
+            course.place, course.quarter, course.since_ms = action.vertex, action.quarter, now_ms
+            if action.act is Act.COUNT:
+                visited.append(action.vertex)
+                course.stops = tuple(stop for stop in course.stops if stop.vertex != action.vertex)
+        return visited
+
+    def release(self, now_ms: int, comes_home: ComesHome | None = None) -> dict[str, list[Action]]:
+        """What each drone may do beyond what it was told: all that its predecessors are done for, as far as
+        the horizon, and no further than it `comes_home` from."""
+        zones = self._zones()
+        told: dict[str, list[Action]] = {}
+        for drone, course in self.drones.items():
+            if course.failed or course.doubt_m > 0.0:
+                continue
+            base_ms = sum(action.duration_ms for action in course.base)
+            fresh: list[Action] = []
+            for number, action in enumerate(course.tail, start=course.released):
+                if base_ms >= HORIZON_MS or not self._is_free(drone, number, action, zones):
+                    break
+                base_ms += action.duration_ms
+                if comes_home is not None and not comes_home(drone, action.vertex, base_ms):
+                    break
+                fresh.append(action)
+            if fresh:
+                if not course.base:
+                    course.since_ms = now_ms
+                course.released += len(fresh)
+                told[drone] = fresh
+        return told
+
+    def _is_free(self, drone: str, number: int, action: Action, zones: Mapping[str, frozenset[int]]) -> bool:
+        if any(action.resource in zone for other, zone in zones.items() if other != drone):
+            return False
+        return all(self.drones[other].done > its for other, its in self._graph.waits_for((drone, number)))
+
+    def _zones(self) -> dict[str, frozenset[int]]:
+        """The grown cells of the drones whose position is doubted."""
+        return {drone: self._zone(course) for drone, course in self.drones.items() if course.doubt_m > 0.0}
+
+    def _zone(self, course: DroneCourse) -> frozenset[int]:
+        reach_m = self._cell.separation_m + course.doubt_m
+        return within(self.lanes, course.air, reach_m, self._cell.upright_m)
+
+    def paused(self) -> frozenset[str]:
+        """The drones that must stand where they are: in doubt themselves, or released into a grown cell that
+        they are not in yet."""
+        found = {drone for drone, course in self.drones.items() if course.doubt_m > 0.0}
+        for doubted, zone in self._zones().items():
+            for drone, course in self.drones.items():
+                if drone != doubted and any(action.resource in zone for action in course.base):
+                    found.add(drone)
+        return frozenset(found)
+
+    def waits(self, drone: str) -> tuple[str, ...]:
+        """For whom a drone waits with its next action."""
+        course = self.drones[drone]
+        if not course.tail:
+            return ()
+        return tuple(
+            other
+            for other, its in self._graph.waits_for((drone, course.released))
+            if self.drones[other].done <= its
+        )
+
+    def projected(self, now_ms: int) -> dict[str, list[Action]]:
+        """What is ahead of each drone, at the times that are to be expected by now."""
+        begun = {
+            (drone, course.done): max(now_ms + 1, course.since_ms + course.ahead[0].duration_ms)
+            for drone, course in self.drones.items()
+            if course.base
+        }
+        done = {drone: course.done for drone, course in self.drones.items()}
+        late_ms = {drone: course.late_ms for drone, course in self.drones.items()}
+        return self._graph.projected(now_ms, done, begun, late_ms)
+
+    def give(self, drone: str, stops: Sequence[Stop], ends: Sequence[int], now_ms: int) -> bool:
+        """Plan a drone's stops, and an end to stay on, round all others.  False, and nothing has changed,
+        where no way was found."""
+        course = self.drones[drone]
+        old = course.stops, course.ends
+        course.late_ms = 0
+        course.stops, course.ends = tuple(stops), tuple(ends)
+        self.replans += 1
+        projected = self.projected(now_ms)
+        request = self._request(drone, projected, now_ms)
+        planned = self._planner.plan([request], self._fixed(projected, {drone}, ()))
+        if drone in planned.without:
+            course.stops, course.ends = old
+            return False
+        self._adopt(projected, planned.plans)
+        return True
+
+    def replan(self, drones: Iterable[str], now_ms: int) -> tuple[str, ...]:
+        """Plan what is not released of these drones anew, all together.  Those for which there is no way,
+        even without stops, hold where their base ends, and are returned."""
+        return self._replan(set(drones), self.projected(now_ms), now_ms)
+
+    def _replan(
+        self, todo: set[str], projected: Mapping[str, Sequence[Action]], now_ms: int
+    ) -> tuple[str, ...]:
+        todo = {drone for drone in todo if not self.drones[drone].failed}
+        holding: set[str] = set()
+        shut = self._closed.union(*self._avoided.values())
+        for drone in todo:
+            course = self.drones[drone]
+            course.stops = tuple(stop for stop in course.stops if stop.vertex not in shut)
+        while True:
+            self.replans += 1
+            fixed = self._fixed(projected, todo - holding, holding)
+            requests = [self._request(drone, projected, now_ms) for drone in sorted(todo - holding)]
+            planned = self._planner.plan(requests, fixed)
+            stopless = [drone for drone in planned.without if self.drones[drone].stops]
+            for drone in stopless:
+                self.drones[drone].stops = ()
+            if stopless:
+                continue
+            if not planned.without:
+                break
+            if not holding and (pushed := self._pushed(projected, now_ms)):
+                for drone in pushed:
+                    self.drones[drone].stops = ()
+                self._adopt(projected, pushed)
+                return ()
+            holding |= set(planned.without)
+            todo |= holding | self._met_by(holding, projected)
+        plans = {**planned.plans, **{drone: Plan(()) for drone in holding}}
+        self._adopt(projected, plans)
+        return tuple(sorted(holding))
+
+    def _pushed(self, projected: Mapping[str, Sequence[Action]], now_ms: int) -> dict[str, Plan] | None:
+        """Everybody sent home by PIBT, whatever they had ahead."""
+        wrecks = {
+            other for course in self.drones.values() for r in course.wreck for other in self.conflicts[r]
+        }
+        flying = [drone for drone, course in self.drones.items() if not course.failed]
+        shut, inside = self._shut(flying)
+        drones: list[Pushed] = []
+        for drone in flying:
+            request = self._request(drone, projected, now_ms)
+            base = tuple(action.resource for action in self.drones[drone].base)
+            avoided = frozenset(inside.get(drone, shut) | wrecks)
+            end = request.ends[0]
+            drones.append(Pushed(drone, request.configuration, request.at_ms, end, base, avoided))
+        return plan_by_pushing(self.net, self.conflicts, self._planner.distances, drones)
+
+    def _met_by(self, holding: Collection[str], projected: Mapping[str, Sequence[Action]]) -> set[str]:
+        """Who would pass where one of these drones holds."""
+        places: set[int] = set()
+        for drone in holding:
+            course = self.drones[drone]
+            places.update(self.conflicts[course.base[-1].vertex if course.base else course.place])
+        return {
+            drone
+            for drone, actions in projected.items()
+            if drone not in holding
+            and any(a.resource in places for a in actions[len(self.drones[drone].base) :])
+        }
+
+    def _request(self, drone: str, projected: Mapping[str, Sequence[Action]], now_ms: int) -> Request:
+        course = self.drones[drone]
+        base = projected[drone][: len(course.base)]
+        place, quarter, at_ms = course.place, course.quarter, now_ms + course.late_ms
+        if base:
+            place, quarter, at_ms = base[-1].vertex, base[-1].quarter, base[-1].end_ms
+        counted = {action.vertex for action in base if action.act is Act.COUNT}
+        stops = tuple(stop for stop in course.stops if stop.vertex not in counted)
+        return Request(drone, at_rest(place, quarter), at_ms, stops, course.ends, course.priority)
+
+    def _fixed(
+        self,
+        projected: Mapping[str, Sequence[Action]],
+        without: Collection[str],
+        holding: Collection[str],
+    ) -> FixedBookings:
+        """What stays as it is while drones `without` are planned anew."""
+        taken: list[tuple[str, int, int, int]] = []
+        for drone, course in self.drones.items():
+            n = len(course.base)
+            actions = projected[drone]
+            taken += [(drone, action.resource, 0, action.end_ms) for action in actions[:n]]
+            if drone in without:
+                continue
+            place, since_ms = (actions[n - 1].vertex, actions[n - 1].end_ms) if n else (course.place, 0)
+            rest = () if drone in holding else actions[n:]
+            taken += [(drone, *each) for each in occupancy(rest, place, since_ms, NEVER)]
+            taken += [(drone, resource, 0, NEVER) for resource in course.wreck]
+        return FixedBookings(taken, *self._shut(without))
+
+    def _shut(self, drones: Iterable[str]) -> tuple[frozenset[int], dict[str, frozenset[int]]]:
+        """What is closed, and what for those who stand in it."""
+        avoided = self._closed.union(*self._avoided.values())
+        inside: dict[str, frozenset[int]] = {}
+        for drone in drones:
+            course = self.drones[drone]
+            at = set(course.air)
+            zones = [zone for zone in (self._closed, *self._avoided.values()) if at.isdisjoint(zone)]
+            if len(zones) <= len(self._avoided):
+                inside[drone] = frozenset().union(*zones)
+        return avoided, inside
+
+    def _adopt(self, projected: Mapping[str, Sequence[Action]], plans: Mapping[str, Plan]) -> None:
+        for drone, course in self.drones.items():
+            n = len(course.base)
+            actions = list(projected[drone])
+            course.ahead = [*actions[:n], *plans[drone].actions] if drone in plans else actions
+        self._rebuild()
+
+    def _rebuild(self) -> None:
+        courses = {
+            drone: Course(course.place, course.done, tuple(course.ahead))
+            for drone, course in self.drones.items()
+        }
+        self._graph = ActionGraph(courses, self.conflicts)
+
+    def fail(self, drone: str, now_ms: int, air: Collection[int] = ()) -> tuple[str, ...]:
+        """A drone does not go on: where it may be (`air`, all that it was released to if that is not known)
+        is closed, others are planned round it.  Returns those for which there is no way."""
+        projected = self.projected(now_ms)
+        course = self.drones[drone]
+        course.wreck = frozenset(air or course.air)
+        reach_m = self._cell.separation_m + course.doubt_m
+        self._avoided[drone] = within(self.lanes, tuple(course.wreck), reach_m, self._cell.upright_m)
+        course.ahead, course.stops, course.doubt_m, course.released = [], (), 0.0, course.done
+        projected[drone] = []
+        return self._replan_met(projected, self._avoided[drone], now_ms)
+
+    def _replan_met(
+        self, projected: Mapping[str, Sequence[Action]], air: frozenset[int], now_ms: int
+    ) -> tuple[str, ...]:
+        met = {
+            drone
+            for drone, course in self.drones.items()
+            if any(action.resource in air for action in course.tail)
+        }
+        return self._replan(met, projected, now_ms)
+
+    def avoided(self, drone: str) -> frozenset[int]:
+        """Where nobody is planned on account of this drone."""
+        return self._avoided.get(drone, frozenset())
+
+    def close(self, resources: Collection[int], now_ms: int) -> tuple[str, ...]:
+        """Nobody enters these any more; who is in there leaves.  Returns those for which there is no way."""
+        self._closed = self._closed | frozenset(resources) | self._enclosed(resources)
+        vertices = {lane_end for r in resources for lane_end in self._ends(r)}
+        for course in self.drones.values():
+            if any(stop.vertex in vertices for stop in course.stops):
+                course.stops = tuple(stop for stop in course.stops if stop.vertex not in vertices)
+        return self._replan_met(self.projected(now_ms), self._closed, now_ms)
+
+    def _enclosed(self, lanes: Collection[int]) -> set[int]:
+        """The vertices from which no other lanes lead than these, and the columns over them."""
+        arcs = self.lanes.arcs
+        inside = {
+            vertex
+            for lane in lanes
+            for vertex in self._ends(lane)
+            if all(arc.resource in lanes for arc in arcs[vertex])
+        }
+        return inside | {self.lanes.column_of[self.lanes.vertices[vertex].node] for vertex in inside}
+
+    def _ends(self, resource: int) -> tuple[int, ...]:
+        number = resource - len(self.lanes.vertices)
+        if 0 <= number < len(self.lanes.lanes):
+            lane = self.lanes.lanes[number]
+            return lane.a, lane.b
+        return (resource,)
+
+    def open(self, resources: Collection[int]) -> None:
+        """They may be flown again."""
+        self._closed = self._closed - frozenset(resources) - self._enclosed(resources)
+
+    def doubt(self, drone: str, doubt_m: float, now_ms: int) -> None:
+        """A drone may be so far beside where it should be, beyond what its cell allows for; 0: it is sure."""
+        course = self.drones[drone]
+        if doubt_m > 0.0 and course.doubt_m <= 0.0:
+            course.doubt_since_ms = now_ms
+        course.doubt_m = doubt_m if math.isfinite(doubt_m) else 0.0
+        if doubt_m <= 0.0:
+            self._avoided.pop(drone, None)
+            course.late_ms = 0
+
+    def avoid(self, drone: str, now_ms: int) -> tuple[str, ...]:
+        """Plan others round all the air in which a drone may be, until it is heard and sure, and before it
+        where they would wait for it."""
+        air = self._avoided[drone] = self._zone(self.drones[drone])
+        met = {
+            other
+            for other, course in self.drones.items()
+            if other != drone and any(action.resource in air for action in course.tail)
+        }
+        return self._replan(met | self._late(drone), self.projected(now_ms), now_ms)
+
+    def overtake(self, drones: Iterable[str], now_ms: int) -> tuple[str, ...]:
+        """Plan those anew who would wait for these drones, which do not get on."""
+        waiting = set().union(*(self._late(drone) for drone in drones))
+        return self._replan(waiting, self.projected(now_ms), now_ms)
+
+    def _late(self, drone: str) -> set[str]:
+        """Expect a drone to be late.  Returns who would wait for it."""
+        self.drones[drone].late_ms = LATE_MS
+        return {
+            other
+            for other, course in self.drones.items()
+            if other != drone and self._ever_waits(other, course, drone)
+        }
+
+    def _ever_waits(self, drone: str, course: DroneCourse, late: str) -> bool:
+        return any(
+            other == late and its >= self.drones[late].done
+            for number in range(course.released, course.done + len(course.ahead))
+            for other, its in self._graph.waits_for((drone, number))
+        )

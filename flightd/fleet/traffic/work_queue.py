@@ -1,0 +1,141 @@
+"""What is to be counted, by value, and who counts what: tours that fit a battery, split over the drones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+_VALUE_SPAN_MS: Final = 3_600_000
+"""A class of value outweighs the way to it up to so long."""
+
+
+class Value(IntEnum):
+    """Why a place is to be counted; the higher, the sooner."""
+
+    OLD = 1
+    NEVER_COUNTED = 2
+    CONTRADICTED = 3
+    ASKED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class NodeWork:
+    """The places that are counted from one node, and how long that takes.  Of equal `value` the one with the
+    greater `age_s` goes first."""
+
+    node: str
+    aisle: str
+    index: int
+    places: tuple[str, ...]
+    dwell_ms: int
+    value: Value = Value.NEVER_COUNTED
+    age_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class TourTimes:
+    """What a tour takes: from the pad to the first node, from one node to another, from a node to a pad."""
+
+    out_ms: Callable[[str], int]
+    between_ms: Callable[[str, str], int]
+    home_ms: Callable[[str], int]
+
+
+class WorkQueue:
+    """Nodes that wait, are given to a drone, are done, or cannot be done for a reason."""
+
+    def __init__(self, work: Iterable[NodeWork]) -> None:
+        self._work: Mapping[str, NodeWork] = {each.node: each for each in work}
+        self._open: dict[str, None] = dict.fromkeys(self._work)
+        self._given: dict[str, str] = {}
+        self.done: list[str] = []
+        self.reasons: dict[str, str] = {}
+
+    def work(self, node: str) -> NodeWork:
+        """KeyError for a node without work."""
+        return self._work[node]
+
+    @property
+    def open(self) -> tuple[str, ...]:
+        """The nodes that wait for a drone."""
+        return tuple(self._open)
+
+    @property
+    def given(self) -> Mapping[str, str]:
+        """Node to drone."""
+        return self._given
+
+    def finish(self, node: str) -> None:
+        """It is counted."""
+        self._given.pop(node, None)
+        self._open.pop(node, None)
+        self.reasons.pop(node, None)
+        if node not in self.done:
+            self.done.append(node)
+
+    def hand_back(self, nodes: Iterable[str], reason: str = "") -> None:
+        """They wait again, or are not to be done, for a reason."""
+        for node in nodes:
+            self._given.pop(node, None)
+            if reason:
+                self._open.pop(node, None)
+                self.reasons[node] = reason
+            else:
+                self._open[node] = None
+
+    def retry(self, nodes: Iterable[str]) -> None:
+        """What was not to be done may be done now."""
+        for node in nodes:
+            if self.reasons.pop(node, None) is not None:
+                self._open[node] = None
+
+    def take(self, drone: str, nodes: Iterable[str]) -> None:
+        """Give nodes to a drone."""
+        for node in nodes:
+            self._open.pop(node)
+            self._given[node] = drone
+
+    def tour(
+        self, times: TourTimes, budget_ms: int, busy_aisles: Collection[str] = (), most: int = 40
+    ) -> tuple[str, ...]:
+        """The nodes of one tour within a budget: first the most valuable aisle that nobody flies in, from its
+        nearer end on, then what lies nearest.  Empty where nothing fits."""
+        aisles: dict[str, list[NodeWork]] = {}
+        for node in self._open:
+            work = self._work[node]
+            if work.aisle not in busy_aisles:
+                aisles.setdefault(work.aisle, []).append(work)
+        ranked = sorted(aisles.values(), key=lambda works: self._rank(works, times))
+        nodes: list[str] = []
+        left_ms = budget_ms
+        for works in ranked:
+            if nodes:
+                works.sort(key=lambda work: times.between_ms(nodes[-1], work.node))
+                if times.between_ms(nodes[-1], works[0].node) > left_ms // 3:
+                    break
+            for work in self._swept(works, nodes, times):
+                way_ms = times.between_ms(nodes[-1], work.node) if nodes else times.out_ms(work.node)
+                fits = way_ms + work.dwell_ms + times.home_ms(work.node) <= left_ms
+                if fits:
+                    left_ms -= way_ms + work.dwell_ms
+                    nodes.append(work.node)
+                if nodes and (not fits or len(nodes) >= most):
+                    return tuple(nodes)
+        return tuple(nodes)
+
+    @staticmethod
+    def _rank(works: Sequence[NodeWork], times: TourTimes) -> tuple[float, float]:
+        best = max(work.value for work in works)
+        nearest_ms = min(times.out_ms(work.node) for work in works)
+        return nearest_ms - best * _VALUE_SPAN_MS, -max(work.age_s for work in works)
+
+    @staticmethod
+    def _swept(works: Sequence[NodeWork], before: Sequence[str], times: TourTimes) -> list[NodeWork]:
+        """One aisle from the end that is nearer; what is worth more in it is flown first."""
+        ordered = sorted(works, key=lambda work: work.index)
+        begin = (lambda node: times.between_ms(before[-1], node)) if before else times.out_ms
+        if begin(ordered[-1].node) < begin(ordered[0].node):
+            ordered.reverse()
+        return sorted(ordered, key=lambda work: -work.value)

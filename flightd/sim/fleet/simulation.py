@@ -1,0 +1,239 @@
+"""Flies a fleet through its hours: the world, the dispatcher between cuts of the links, and the judge."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport, Endurance
+from flightd.fleet.traffic.lanes import LaneGraph, lanes_of
+from flightd.fleet.traffic.plan import Action
+from flightd.fleet.traffic.traffic_control import TrafficControl
+from flightd.fleet.traffic.work_queue import NodeWork, WorkQueue
+from flightd.mission.plan.leg_times import Pace
+from flightd.sim.fleet.hall import fleet_hall
+from flightd.sim.fleet.judge import FleetJudge, fault_document
+from flightd.sim.fleet.world import FleetWorld, Unknowns
+from flightd.site.shelf_cells import by_node
+from flightd.site.site import Site
+
+PACE: Final = Pace(
+    height_m=1.5,
+    climb_mps=0.5,
+    climb_accel_mps2=0.5,
+    speed_mps=1.0,
+    accel_mps2=0.8,
+    turn_rate_radps=0.8,
+    turn_accel_radps2=1.5,
+    settle_s=0.4,
+    dwell_s=3.0,
+    take_off_s=4.0,
+    land_s=5.0,
+)
+_PLACE_S: Final = 2.5
+_STEP_S: Final = 0.25
+_HUB_STEPS: Final = 2
+
+
+@dataclass(frozen=True, slots=True)
+class FleetScenario:
+    """What is flown.  `failing` drones fail between shelves after they counted for a time within `fails_s`,
+    each after a while of its own; one aisle is closed from `closed_from` to `closed_to`, shares of the
+    hours."""
+
+    drones: int = 10
+    aisles: int = 40
+    nodes: int = 48
+    hours: float = 8.0
+    seed: int = 1
+    failing: int = 2
+    fails_s: tuple[float, float] = (600.0, 2400.0)
+    closed_from: float = 0.05
+    closed_to: float = 0.15
+    closes_aisle: bool = True
+    unknowns: Unknowns = field(default_factory=Unknowns)
+    endurance: Endurance = field(default_factory=Endurance)
+    cell: CellSize = field(default_factory=CellSize)
+
+
+@dataclass(frozen=True, slots=True)
+class FleetResult:
+    """What came of it."""
+
+    scenario: FleetScenario
+    judge: FleetJudge
+    places: int
+    counted: int
+    reasons: Mapping[str, str]
+    end_s: float
+    flown_s: float
+    least_charge: float
+    failed: tuple[str, ...]
+    replans: int
+
+    @property
+    def good(self) -> bool:
+        """Nothing was wrong."""
+        return not self.judge.faults
+
+    @property
+    def places_per_hour(self) -> float:
+        """Of the whole fleet, until the last place was counted."""
+        return self.counted / max(self.end_s / 3600.0, 1e-9)
+
+    def document(self) -> dict[str, Any]:
+        """As JSON has it."""
+        s, judge = self.scenario, self.judge
+        return {
+            "verdict": "good" if self.good else "bad",
+            "drones": s.drones,
+            "aisles": s.aisles,
+            "hours": s.hours,
+            "seed": s.seed,
+            "places": self.places,
+            "counted": self.counted,
+            "not_counted": dict(self.reasons),
+            "places_per_hour": round(self.places_per_hour, 1),
+            "end_s": round(self.end_s, 1),
+            "flown_s": round(self.flown_s, 1),
+            "shared_cells": judge.count("shared_cell"),
+            "deadlocks": judge.count("deadlock"),
+            "below_reserve": judge.count("below_reserve"),
+            "unanswered": judge.count("unanswered"),
+            "least_distance_m": round(judge.least_m, 3) if judge.least_m < 1e9 else None,
+            "least_charge": round(self.least_charge, 3),
+            "failed": list(self.failed),
+            "replans": self.replans,
+            "faults": [fault_document(fault) for fault in judge.faults],
+        }
+
+
+def work_of(site: Site) -> list[NodeWork]:
+    """Every node with places."""
+    return [
+        NodeWork(
+            node,
+            site.nodes[node].aisle,
+            site.nodes[node].index,
+            tuple(location.code for location in locations),
+            int(len(locations) * _PLACE_S * 1000),
+        )
+        for node, locations in by_node(site.locations.values()).items()
+    ]
+
+
+class FleetSimulation:
+    """One scenario, step by step."""
+
+    def __init__(self, scenario: FleetScenario, site: Site | None = None) -> None:
+        self.scenario = scenario
+        self.site = site or fleet_hall(scenario.aisles, scenario.nodes, scenario.drones)
+        self.lanes: LaneGraph = lanes_of(self.site)
+        e = scenario.endurance
+        self.world = FleetWorld(self.lanes, PACE, scenario.unknowns, 1 / e.flight_s, 1 / e.charge_s)
+        self.control = TrafficControl(self.lanes, PACE, scenario.cell)
+        self.queue = WorkQueue(work_of(self.site))
+        self.dispatcher = Dispatcher(self.control, self.queue, e)
+        self.judge = FleetJudge(scenario.cell, e.reserve)
+        rng = random.Random(f"fleet {scenario.seed}")
+        for i, pad in enumerate(self.lanes.pads[: scenario.drones], start=1):
+            drone = self.world.add(f"drone-{i}", pad, f"{scenario.seed} {i}")
+            self.control.enter(drone.name, pad)
+        for name in rng.sample(sorted(self.world.drones), min(scenario.failing, scenario.drones)):
+            self.world.drones[name].fails_after_s = rng.uniform(*scenario.fails_s)
+        aisle = rng.choice([aisle for aisle in self.site.aisles if aisle.shelves])
+        nodes = [node.id for node in self.site.aisle_nodes(aisle.id)][1:-1]
+        self._closing = dict(itertools.pairwise(nodes))
+        self.closed_aisle = aisle.id
+        self.now_s = 0.0
+        self._unsent: dict[str, list[Action]] = {}
+
+    def run(self) -> FleetResult:
+        """To the end of the hours, or of the work."""
+        s = self.scenario
+        end_s = s.hours * 3600.0
+        steps, at_s, last_s = 0, 0.0, 0.0
+        done = 0
+        closes = [s.closed_from * end_s, s.closed_to * end_s] if s.closes_aisle else []
+        while at_s < end_s:
+            if steps % _HUB_STEPS == 0:
+                now_ms = int(at_s * 1000)
+                if closes and at_s >= closes[0]:
+                    closes.pop(0)
+                    self._close(now_ms, shuts=len(closes) == 1)
+                self._hub(now_ms)
+                if len(self.queue.done) > done:
+                    done, last_s = len(self.queue.done), at_s
+            self.world.step(_STEP_S)
+            steps += 1
+            at_s = self.now_s = steps * _STEP_S
+            drones = list(self.world.drones.values())
+            self.judge.see(at_s, drones, work_left=bool(self.queue.open or self.queue.given))
+            left = self.queue.open or self.queue.given or closes
+            if not left and not any(self.world.flies(drone) for drone in drones):
+                break
+        return self._result(at_s, last_s)
+
+    def _close(self, now_ms: int, *, shuts: bool) -> None:
+        if shuts:
+            self.dispatcher.shut(self._closing, f"aisle {self.closed_aisle} is closed", now_ms)
+        else:
+            self.dispatcher.unshut(self._closing)
+
+    def _hub(self, now_ms: int) -> None:
+        linked = [drone for drone in self.world.drones.values() if drone.cut_s <= 0.0]
+        reports = [
+            DroneReport(drone.name, drone.done, drone.charge, drone.doubt_m, drone.failed) for drone in linked
+        ]
+        commands = self.dispatcher.step(now_ms, reports)
+        for name, drone in self.world.drones.items():
+            fresh = self._unsent.pop(name, []) + list(commands.base.get(name, ()))
+            if drone.cut_s > 0.0:
+                self._unsent[name] = fresh
+            else:
+                self.world.tell(name, fresh, paused=name in commands.paused)
+
+    def _result(self, at_s: float, last_s: float) -> FleetResult:
+        places = {node: len(self.queue.work(node).places) for node in self._nodes()}
+        reasons = dict(self.queue.reasons)
+        left = (*self.queue.open, *self.queue.given)
+        late = at_s >= self.scenario.hours * 3600.0
+        flying = [drone for drone in self.world.drones.values() if not drone.failed]
+        for node in left:
+            if late:
+                reasons[node] = "the hours are over"
+            elif not flying:
+                reasons[node] = "no drone is left"
+        unanswered = [node for node in places if node not in reasons and node not in set(self.queue.done)]
+        self.judge.end(at_s, unanswered)
+        drones = self.world.drones.values()
+        return FleetResult(
+            self.scenario,
+            self.judge,
+            sum(places.values()),
+            sum(places[node] for node in self.queue.done),
+            reasons,
+            at_s if left else last_s,
+            sum(drone.flown_s for drone in drones),
+            min((drone.least_charge for drone in drones if not drone.failed), default=1.0),
+            tuple(drone.name for drone in drones if drone.failed),
+            self.control.replans,
+        )
+
+    def _nodes(self) -> list[str]:
+        return [work.node for work in work_of(self.site)]
+
+
+def fly_fleet(scenario: FleetScenario) -> FleetResult:
+    """Fly it."""
+    return FleetSimulation(scenario).run()
+
+
+def alone(scenario: FleetScenario) -> FleetScenario:
+    """The same hall and hours for one drone that nothing happens to but its own pace: what a fleet is
+    compared with."""
+    return replace(scenario, drones=1, failing=0, closes_aisle=False)

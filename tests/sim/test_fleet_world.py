@@ -1,0 +1,81 @@
+"""Whole fleets in the world without pixels, judged by where the drones truly are."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import pytest
+
+from flightd.fleet.traffic.cells import CellSize
+from flightd.sim.fleet.judge import FleetJudge
+from flightd.sim.fleet.simulation import FleetScenario, FleetSimulation, fly_fleet
+from flightd.sim.fleet.world import FleetDrone, Unknowns
+
+SMALL = FleetScenario(drones=4, aisles=6, nodes=8, hours=3.0, failing=1, fails_s=(60.0, 240.0))
+ROUGH = Unknowns(pace_sigma=0.2, slow_per_h=8, link_cuts_per_h=20, link_cut_s=60, doubts_per_h=10, doubt_s=40)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_fleet_in_trouble_counts_every_place_or_says_why_not(seed: int) -> None:
+    result = fly_fleet(replace(SMALL, seed=seed, unknowns=ROUGH))
+    assert result.judge.faults == []
+    assert result.good
+    assert result.failed
+    document = result.document()
+    assert set(result.reasons.values()) <= {
+        f"{result.failed[0]} {what} there" for what in ("failed", "is silent")
+    }
+    assert 0 < document["places"] - document["counted"] <= 16 * len(result.reasons)
+    assert document["least_distance_m"] > 0.9
+    assert document["least_charge"] >= SMALL.endurance.reserve
+
+
+def test_the_same_seed_flies_the_same() -> None:
+    scenario = replace(SMALL, hours=0.15, unknowns=ROUGH)
+    first, second, other = (fly_fleet(replace(scenario, seed=seed)).document() for seed in (5, 5, 6))
+    assert first == second
+    assert first != other
+
+
+def test_a_closed_aisle_is_left_alone_while_it_is_closed() -> None:
+    scenario = replace(SMALL, failing=0, closed_from=0.0, closed_to=0.4, hours=2.0)
+    simulation = FleetSimulation(scenario)
+    closed = simulation.closed_aisle
+    seen: set[str] = set()
+    step = simulation.world.step
+
+    def watched(dt_s: float) -> None:
+        step(dt_s)
+        if simulation.now_s < 0.4 * 7200.0:
+            vertices = simulation.lanes.vertices
+            seen.update(vertices[drone.place].node for drone in simulation.world.drones.values())
+
+    simulation.world.step = watched  # type: ignore[method-assign]
+    result = simulation.run()
+    inside = {node.id for node in simulation.site.aisle_nodes(closed)[2:-2]}
+    assert seen
+    assert not seen & inside
+    assert result.good
+    assert result.counted == result.places
+
+
+def test_two_that_are_too_near_share_a_cell_once_until_they_part() -> None:
+    judge = FleetJudge(CellSize(), 0.15)
+    a, b = (FleetDrone(name, 0, random.Random(1)) for name in "ab")
+    for at_s, apart_m in enumerate((2.0, 0.5, 0.4, 2.0, 0.5)):
+        b.x_m = apart_m
+        judge.see(at_s, [a, b], work_left=True)
+    assert [(fault.kind, fault.at_s) for fault in judge.faults] == [("shared_cell", 1), ("shared_cell", 4)]
+    assert judge.least_m == 0.4
+
+
+def test_below_the_reserve_and_standing_still_are_faults() -> None:
+    judge = FleetJudge(CellSize(), 0.15)
+    drone = FleetDrone("a", 0, random.Random(1), charge=0.1)
+    drone.base.append(None)  # type: ignore[arg-type]
+    for at_s in range(0, 1300, 100):
+        judge.see(float(at_s), [drone], work_left=True)
+    assert [fault.kind for fault in judge.faults] == ["below_reserve", "deadlock"]
+    judge.end(1300.0, ["A1"])
+    assert judge.count("unanswered") == 1

@@ -1,0 +1,82 @@
+"""What is counted first, by whom, and what becomes of it."""
+
+from __future__ import annotations
+
+from flightd.fleet.traffic.work_queue import NodeWork, TourTimes, Value, WorkQueue
+
+HOP_MS = 2_000
+
+
+def work(node: str, value: Value = Value.NEVER_COUNTED, age_s: float = 0.0) -> NodeWork:
+    return NodeWork(node, node[0], int(node[1:]), (f"{node}-1", f"{node}-2"), 10_000, value, age_s)
+
+
+def times(pad_aisle: str = "A") -> TourTimes:
+    """Aisles are 10 s apart, nodes 2 s; the pad lies before the first node of an aisle."""
+
+    def between_ms(a: str, b: str) -> int:
+        return 10_000 * abs(ord(a[0]) - ord(b[0])) + HOP_MS * abs(int(a[1:]) - int(b[1:]))
+
+    return TourTimes(
+        lambda node: between_ms(f"{pad_aisle}0", node),
+        between_ms,
+        lambda node: between_ms(node, f"{pad_aisle}0"),
+    )
+
+
+def test_a_tour_sweeps_the_nearest_aisle_from_its_nearer_end() -> None:
+    queue = WorkQueue(work(node) for node in ("B1", "A3", "A1", "A2"))
+    assert queue.tour(times(), 1_000_000) == ("A1", "A2", "A3", "B1")
+
+
+def test_a_tour_fits_its_budget_with_the_way_home() -> None:
+    queue = WorkQueue(work(f"A{i}") for i in range(1, 9))
+    nodes = queue.tour(times(), 60_000)
+    assert nodes == ("A1", "A2", "A3", "A4")  # 4 x 12 s, and 8 s home
+    assert queue.tour(times(), 5_000) == ()
+
+
+def test_what_lies_too_far_for_the_battery_keeps_nobody_from_the_rest() -> None:
+    queue = WorkQueue([work("D3", Value.ASKED), work("A1")])
+    assert queue.tour(times(), 30_000) == ("A1",)
+
+
+def test_the_most_valuable_places_come_first_however_far() -> None:
+    queue = WorkQueue(
+        [
+            work("A1", Value.OLD),
+            work("B1"),
+            work("C2", Value.CONTRADICTED),
+            work("D3", Value.ASKED),
+            work("D1", Value.OLD),
+        ]
+    )
+    assert queue.tour(times(), 100_000)[0] == "D3"
+    queue.take("d", ["D3", "D1"])
+    assert queue.tour(times(), 1_000_000)[0] == "C2"
+
+
+def test_of_equal_value_and_way_the_oldest_aisle_comes_first() -> None:
+    queue = WorkQueue([work("B1", Value.OLD, 10.0), work("D1", Value.OLD, 99.0)])
+    assert queue.tour(times("C"), 1_000_000)[0] == "D1"
+
+
+def test_an_aisle_in_which_somebody_flies_is_left_to_it() -> None:
+    queue = WorkQueue(work(node) for node in ("A1", "A2", "B1"))
+    queue.take("d", ["A1"])
+    assert queue.tour(times(), 1_000_000, busy_aisles={"A"}) == ("B1",)
+
+
+def test_what_is_handed_back_waits_again_or_has_its_reason() -> None:
+    queue = WorkQueue(work(node) for node in ("A1", "A2", "A3"))
+    queue.take("d", ["A1", "A2"])
+    queue.hand_back(["A1"])
+    queue.hand_back(["A2"], "aisle A is closed")
+    assert queue.open == ("A3", "A1")
+    assert queue.reasons == {"A2": "aisle A is closed"}
+    queue.retry(["A2", "A3"])
+    assert set(queue.open) == {"A1", "A2", "A3"}
+    assert queue.reasons == {}
+    queue.finish("A2")
+    assert queue.done == ["A2"]
+    assert set(queue.open) == {"A1", "A3"}
