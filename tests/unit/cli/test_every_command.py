@@ -63,10 +63,11 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd inventory export": ("none", "--out", "x.pdf"),
     "flightd inventory compare": ("none", "none.csv"),
     "flightd inventory merge": ("stock", "none"),
+    "flightd study": ("none.mcap",),
     "flightd store deliver": (".", "--store", "http://ground.hall"),
     "flightd store prune": (".", "--store", "none://x"),
     "flightd store show": ("--store", "."),
-    "flightd store export": ("--store", "empty.mcap", "--out", "x.parquet"),
+    "flightd store export": ("--store", "none://x", "--out", "x.parquet"),
     "flightctl keygen": ("ann", "--role", "captain"),
     "flightctl protocol": ("--json", "surplus"),
     "flightctl goto": ("A2",),
@@ -95,8 +96,7 @@ COMMANDS = dict(
 )
 GROUPS = (
     "flightd", "flightctl", "flightd log", "flightd map", "flightd inventory", "flightd fleet",
-    "flightd ground people",
-    "flightd ground keys", "flightd store",
+    "flightd ground people", "flightd ground keys", "flightd store",
 )  # fmt: skip
 
 Run = Callable[..., tuple[int, str, str]]
