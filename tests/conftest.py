@@ -45,6 +45,8 @@ _COSTLY = {
 _ON_ONE_DATABASE = "tests/unit/ground_store/"
 _IN_BROWSER = re.compile(r"tests/web/test_(?:\w*page|language)\.py")
 """Each starts a Chromium, and a station for all its tests."""
+_PAGES_WITHIN = 0.9
+"""Of the flights: by then all pages have begun."""
 _IN_CI = os.environ.get("CI", "") == "true"
 _PATIENCE = pytest.StashKey[Patience]()
 
@@ -62,16 +64,19 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whole flights first, then what needs a browser: one that began last would keep one core busy while the
-    other waits.  Of those by the clock come last what needs little of the machine: they are short."""
-    items.sort(
-        key=lambda item: (
-            -_cores_of(item),
-            item.get_closest_marker("slow") is None,
-            "/sim/" not in item.nodeid,
-            _IN_BROWSER.match(item.nodeid) is None,
-        )
-    )
+    """Whole flights first, and spread among them what needs a browser: a flight computes, a page mostly
+    waits, and one that began last would keep one core busy while the other waits.  Of those by the clock come
+    last what needs little of the machine: they are short."""
+    flights = [item for item in items if "/sim/" in item.nodeid]
+    flights.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    turn = {item.nodeid: number / len(flights) for number, item in enumerate(flights)}
+    pages = list(dict.fromkeys(_module(item) for item in items if _IN_BROWSER.match(item.nodeid)))
+    among = {module: _PAGES_WITHIN * number / len(pages) for number, module in enumerate(pages)}
+    items.sort(key=lambda item: (-_cores_of(item), turn.get(item.nodeid, among.get(_module(item), 1.0))))
+
+
+def _module(item: pytest.Item) -> str:
+    return item.nodeid.partition("::")[0]
 
 
 def _cores_of(item: pytest.Item) -> float:

@@ -39,6 +39,18 @@ class ValueKind(enum.StrEnum):
     NET_VOLUME = "net_volume"
 
 
+DATES: Final = frozenset(
+    {
+        ValueKind.PRODUCTION_DATE,
+        ValueKind.PACKAGING_DATE,
+        ValueKind.BEST_BEFORE,
+        ValueKind.SELL_BY,
+        ValueKind.EXPIRY,
+    }
+)
+NUMBERS: Final = frozenset(ValueKind) - DATES - {ValueKind.LOT, ValueKind.SERIAL, ValueKind.LPN}
+
+
 class ValueSource(enum.StrEnum):
     """Where a value comes from."""
 
@@ -61,13 +73,24 @@ class UnknownReason(enum.StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LabelValue:
-    """One value as one source tells it.  `unit` is empty for what has none; confidence is 0..1."""
+    """One value as one source tells it.  `text` is its `told_text`; `unit` is empty for what has none;
+    confidence is 0..1."""
 
     kind: ValueKind
-    value: Told
+    text: str
     unit: str
     source: ValueSource
     confidence: float
+
+    @property
+    def value(self) -> Told:
+        """A date or a number where the kind is one and the text says one, else the text."""
+        try:
+            if self.kind in DATES:
+                return date.fromisoformat(self.text)
+            return Decimal(self.text) if self.kind in NUMBERS else self.text
+        except (ValueError, ArithmeticError):
+            return self.text
 
 
 @dataclass(frozen=True, slots=True)

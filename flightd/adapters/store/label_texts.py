@@ -73,5 +73,5 @@ def _type_of(value: Told) -> str:
 
 def _value(row: list[Any]) -> LabelValue:
     kind, type_, text, confidence = row
-    value = _TYPES[type_](text)
-    return LabelValue(ValueKind(kind), value, "", ValueSource.TEXT, float(confidence))
+    _TYPES[type_](text)  # of another program: ValueError
+    return LabelValue(ValueKind(kind), text, "", ValueSource.TEXT, float(confidence))

@@ -12,7 +12,7 @@ from datetime import date
 from decimal import Decimal
 from typing import Final, TypeAlias
 
-from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource
+from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource, told_text
 from flightd.vision.shelf.gs1 import Elements
 
 _Told: TypeAlias = tuple[ValueKind, Told, str]
@@ -61,7 +61,9 @@ def gs1_values(elements: Elements, confidence: float, seen_on: date) -> tuple[La
     texts = ((_TEXTS[ai], value, "") for ai, value in elements if ai in _TEXTS)
     counts = ((ValueKind.QUANTITY, Decimal(value), "") for ai, value in elements if ai in _COUNTS)
     told: tuple[_Told, ...] = (*texts, *counts, *_measures(elements))
-    sure = (LabelValue(kind, value, unit, ValueSource.GS1, confidence) for kind, value, unit in told)
+    sure = (
+        LabelValue(kind, told_text(value), unit, ValueSource.GS1, confidence) for kind, value, unit in told
+    )
     return (*sure, *_dates(elements, confidence, seen_on.year))
 
 
@@ -87,7 +89,7 @@ def _dates(elements: Elements, confidence: float, year: int) -> Iterator[LabelVa
         if ai in _DATES:
             day = full_date(value, year)
             sure = confidence if day else 0.0
-            yield LabelValue(_DATES[ai], day or value, "", ValueSource.GS1, sure)
+            yield LabelValue(_DATES[ai], told_text(day or value), "", ValueSource.GS1, sure)
 
 
 def _measures(elements: Elements) -> list[_Told]:

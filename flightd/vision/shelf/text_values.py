@@ -17,7 +17,7 @@ from typing import Final
 
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.label_text import TextLine, TextLook
-from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource
+from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource, told_text
 
 _ALIKE: Final = {character: group for group in ("O0", "Il1") for character in group}
 _MOST_READINGS: Final = 4096
@@ -51,7 +51,7 @@ def _value(line: TextLine, pattern: LabelTextConfig) -> LabelValue | None:
     agreed = len(values) == 1 and all(value is not None for value, _ in told)
     confidence = max(sure for _, sure in told) if agreed and min(sure for _, sure in told) > 0.0 else 0.0
     first = next(value for value, _ in told if value is not None)
-    return LabelValue(ValueKind(pattern.kind), first, "", ValueSource.TEXT, round(confidence, 4))
+    return LabelValue(ValueKind(pattern.kind), told_text(first), "", ValueSource.TEXT, round(confidence, 4))
 
 
 def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> tuple[Told | None, float]:

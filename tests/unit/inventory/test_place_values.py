@@ -79,7 +79,7 @@ LOT = LabelValue(ValueKind.LOT, "B1", "", ValueSource.TEXT, 0.95)
     [
         ((), (LOT,), "B1"),
         ((), (replace(LOT, confidence=0.89),), UnknownReason.UNSURE),
-        ((), (LOT, replace(LOT, value="B2")), UnknownReason.CONTRADICTING),
+        ((), (LOT, replace(LOT, text="B2")), UnknownReason.CONTRADICTING),
         ((code("x", a10="B9"),), (), "B9"),
         ((code("x", a10="B9"),), (replace(LOT, confidence=0.5),), "B9"),
         ((code("x", a10="B9"),), (LOT,), UnknownReason.CONTRADICTING),

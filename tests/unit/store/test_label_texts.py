@@ -8,14 +8,14 @@ from decimal import Decimal
 from pathlib import Path
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.label_values import LabelValue, ValueKind, ValueSource
+from flightd.core.label_values import LabelValue, ValueKind, ValueSource, told_text
 from tests.unit.store.kill_at_random import look
 
 
 def text(
     value: str | date | Decimal, kind: ValueKind = ValueKind.LOT, confidence: float = 0.95
 ) -> LabelValue:
-    return LabelValue(kind, value, "", ValueSource.TEXT, confidence)
+    return LabelValue(kind, told_text(value), "", ValueSource.TEXT, confidence)
 
 
 FOUND = (text("B1"), text(date(2027, 1, 31), ValueKind.EXPIRY), text(Decimal(48), ValueKind.QUANTITY, 0.5))
