@@ -43,7 +43,7 @@ _MOST_BLUR: Final = 1.7
 _LEAST_AGREEING, _LEAST_UNFORCED = 3, 2
 _MOST_FORCED: Final = 1.0
 _LEAST_EVIDENCE: Final = 90.0
-"""Of what is drawn at random and read wrongly, none of thousands came to more than 80."""
+"""Wrong texts that bands agreed on, of codes drawn at random with more blur than can be read, came to 80."""
 
 
 @dataclass(frozen=True, slots=True)
