@@ -70,13 +70,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     flights = [item for item in items if "/sim/" in item.nodeid]
     flights.sort(key=lambda item: item.get_closest_marker("slow") is None)
     turn = {item.nodeid: number / len(flights) for number, item in enumerate(flights)}
-    pages = list(dict.fromkeys(_module(item) for item in items if _IN_BROWSER.match(item.nodeid)))
+    pages = list(dict.fromkeys(_module(item.nodeid) for item in items if _IN_BROWSER.match(item.nodeid)))
     among = {module: _PAGES_WITHIN * number / len(pages) for number, module in enumerate(pages)}
-    items.sort(key=lambda item: (-_cores_of(item), turn.get(item.nodeid, among.get(_module(item), 1.0))))
+    items.sort(
+        key=lambda item: (-_cores_of(item), turn.get(item.nodeid, among.get(_module(item.nodeid), 1.0)))
+    )
 
 
-def _module(item: pytest.Item) -> str:
-    return item.nodeid.partition("::")[0]
+def _module(nodeid: str) -> str:
+    return nodeid.partition("::")[0]
 
 
 def _cores_of(item: pytest.Item) -> float:
@@ -91,7 +93,7 @@ class _CostlyTogether(LoadScopeScheduling):  # type: ignore[misc]  # its library
     def _split_scope(self, nodeid: str) -> str:
         if nodeid.startswith(_ON_ONE_DATABASE):
             return _ON_ONE_DATABASE
-        module = nodeid.partition("::")[0]
+        module = _module(nodeid)
         return module if module in _COSTLY or _IN_BROWSER.fullmatch(module) else nodeid
 
 

@@ -5,20 +5,18 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from flightd.cli.options import AsJson, Log
 from flightd.cli.tables import stdout
 from flightd.core.errors import RunError
+from flightd.replay.tolerances import LAST_DIGITS, MOST_PIXELS
 
 if TYPE_CHECKING:
     from flightd.replay.decision_compare import Comparison
     from flightd.replay.perception_compare import PerceptionDrift
-
-_LAST_DIGITS: Final = 1e-9
-"""Another processor's matrix kernels add in another order: their sums end in other last digits."""
 
 
 def register(app: typer.Typer) -> None:
@@ -30,11 +28,11 @@ def replay(
     log: Log,
     tolerance: Annotated[
         float, typer.Option(min=0.0, help="Largest difference of a decision's number that is no failure.")
-    ] = _LAST_DIGITS,
+    ] = LAST_DIGITS,
     pixels: Annotated[
         float,
         typer.Option(min=0.0, help="Most that 95 % of the lines in the compressed pictures may move."),
-    ] = 0.5,
+    ] = MOST_PIXELS,
     as_json: AsJson = False,
 ) -> None:
     """Take a recorded flight through today's code and compare every decision with the record.
@@ -78,14 +76,9 @@ def replay(
 
 
 def _complaint(decisions: Comparison, tolerance: float, seen: PerceptionDrift, pixels: float) -> str:
-    found = []
-    if decisions.missing:
-        found.append(f"{decisions.missing} ticks or decisions are missing in the log")
-    elif not decisions.within(tolerance):
-        found.append(f"{decisions.differing} of {decisions.ticks} decisions drift")
-    if told := seen.complaint(pixels):
-        found.append(f"the pictures are seen differently: {told}")
-    return "; ".join(found)
+    told = seen.complaint(pixels)
+    found = decisions.complaint(tolerance), told and f"the pictures are seen differently: {told}"
+    return "; ".join(filter(None, found))
 
 
 def _print_seen(seen: PerceptionDrift, pixels: float) -> None:

@@ -58,6 +58,12 @@ class Comparison:
         """Whether nothing is missing and no field drifts by more than `tolerance`."""
         return not self.missing and all(drift.largest <= tolerance for drift in self.drifts)
 
+    def complaint(self, tolerance: float) -> str:
+        """What drifts by more, or is missing; empty for nothing."""
+        if self.missing:
+            return f"{self.missing} ticks or decisions are missing in the log"
+        return "" if self.within(tolerance) else f"{self.differing} of {self.ticks} decisions drift"
+
 
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
     """The comparison as JSON has it; a difference of what is no number has no `largest`."""

@@ -14,7 +14,6 @@ from typing import TypeAlias
 from rich.console import Console
 
 from flightd.core.errors import InputError
-from flightd.core.label_values import told_text
 from flightd.core.terminal_text import visible
 from flightd.core.types import CodeRead
 from flightd.studies.frame_files import all_pictures
@@ -175,7 +174,7 @@ def _print_texts(texts: PrintedTexts, console: Console) -> None:
         told = f"  line         {visible(look.text)}  ({min(look.sure, default=0.0):.2f})"
         console.print(told, highlight=False, markup=False, soft_wrap=True)
     for value in texts.values:
-        text = visible(told_text(value.value)) if is_sure(value) else "unknown"
+        text = visible(value.text) if is_sure(value) else "unknown"
         told = f"  {value.kind:<12} {text}  ({value.confidence:.2f})"
         console.print(told, highlight=False, markup=False, soft_wrap=True)
 

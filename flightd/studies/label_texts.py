@@ -11,7 +11,7 @@ from flightd.config.label_text import LabelTextConfig
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
 from flightd.core.label_text import TextLine, TextLook
-from flightd.core.label_values import LEAST_TEXT_CONFIDENCE, LabelValue, told_text
+from flightd.core.label_values import LEAST_TEXT_CONFIDENCE, LabelValue
 from flightd.core.types import Image
 from flightd.studies.progress_bar import track
 from flightd.vision.shelf.text_reader import TextReader
@@ -114,7 +114,7 @@ def texts_json(texts: PrintedTexts, width_px: int, height_px: int) -> dict[str, 
     values = [
         {
             "kind": value.kind.value,
-            "value": told_text(value.value) if is_sure(value) else None,
+            "value": value.text if is_sure(value) else None,
             "confidence": value.confidence,
         }
         for value in texts.values

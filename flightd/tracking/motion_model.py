@@ -64,16 +64,18 @@ class Carrier(NamedTuple):
     def accel(self, told: Attitude, ahead_s: float) -> tuple[float, float]:
         """Acceleration along the grid axes (m/s2) so much later, in that attitude: as `lean` and the push
         make it, for a hundred steps in each control tick while nothing is seen."""
+        roll, pitch = told.roll_rad + self.roll_rad, told.pitch_rad + self.pitch_rad
         yaw = told.yaw_rad + self.psi_rad
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        forward = -GRAVITY_MPS2 * math.tan(told.pitch_rad + self.pitch_rad)
-        right = GRAVITY_MPS2 * math.tan(told.roll_rad + self.roll_rad)
+        ax, ay = _leant(roll, pitch, math.cos(yaw), math.sin(yaw))
         left = math.exp(-ahead_s / self.gust_s)
         (steady_x, steady_y), (gust_x, gust_y) = self.steady_mps2, self.gust_mps2
-        return (
-            cos * forward - sin * right + (steady_x + gust_x * left),
-            sin * forward + cos * right + (steady_y + gust_y * left),
-        )
+        return ax + (steady_x + gust_x * left), ay + (steady_y + gust_y * left)
+
+
+def _leant(roll_rad: float, pitch_rad: float, cos: float, sin: float) -> tuple[float, float]:
+    """Acceleration along the grid axes (m/s2) at constant height; `cos` and `sin` are of the yaw to them."""
+    forward, right = -GRAVITY_MPS2 * math.tan(pitch_rad), GRAVITY_MPS2 * math.tan(roll_rad)
+    return cos * forward - sin * right, sin * forward + cos * right
 
 
 def lean(x: Matrix, told: Told) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
@@ -81,10 +83,12 @@ def lean(x: Matrix, told: Told) -> tuple[tuple[float, float], tuple[float, float
     more of roll and of pitch would make."""
     roll, pitch, yaw = told.roll_rad + float(x[ROLL]), told.pitch_rad + float(x[PITCH]), told.yaw_rad + x[PSI]
     cos, sin = math.cos(yaw), math.sin(yaw)
-    forward, right = -GRAVITY_MPS2 * math.tan(pitch), GRAVITY_MPS2 * math.tan(roll)
     per_roll, per_pitch = GRAVITY_MPS2 / math.cos(roll) ** 2, -GRAVITY_MPS2 / math.cos(pitch) ** 2
-    accel = cos * forward - sin * right, sin * forward + cos * right
-    return accel, (-sin * per_roll, cos * per_roll), (cos * per_pitch, sin * per_pitch)
+    return (
+        _leant(roll, pitch, cos, sin),
+        (-sin * per_roll, cos * per_roll),
+        (cos * per_pitch, sin * per_pitch),
+    )
 
 
 def moved(

@@ -9,7 +9,7 @@ from datetime import date
 from decimal import Decimal
 from typing import Any, Final, TypeAlias
 
-from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource, told_text
+from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource
 
 TEXT_TABLES: Final = (
     """CREATE TABLE text_search (
@@ -27,7 +27,7 @@ _TYPES: Final[dict[str, Callable[[str], Told]]] = {"text": str, "date": date.fro
 def keep_texts(db: sqlite3.Connection, observation: str, texts: Iterable[LabelValue], asked: str) -> None:
     """Put what a search found in the place of what an earlier one did.  An observation that is not there
     has no texts."""
-    found = json.dumps([[v.kind.value, _type_of(v.value), told_text(v.value), v.confidence] for v in texts])
+    found = json.dumps([[v.kind.value, _type_of(v.value), v.text, v.confidence] for v in texts])
     db.execute(
         "INSERT INTO text_search SELECT ?1, ?2, ?3 WHERE EXISTS (SELECT 1 FROM observation WHERE id = ?1) "
         "ON CONFLICT (observation) DO UPDATE SET asked = excluded.asked, found = excluded.found",

@@ -12,7 +12,6 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.app.build import detector_of, pilot_of
 from flightd.app.log_study.finding import Finding, LogFindings, Outcome, Study, same_or
 from flightd.app.log_study.recorded_simulation import recorded_simulation
@@ -21,15 +20,16 @@ from flightd.app.simulation.judgement import judge_flight
 from flightd.core.errors import FlightdError, InputError
 from flightd.core.inventory import LocationRecord
 from flightd.core.topics import Topic
+from flightd.core.types import Image
 from flightd.replay.decision_compare import comparison_document, replay_decisions
 from flightd.replay.log import read_log
 from flightd.replay.perception_compare import replay_pictures
+from flightd.replay.report.stock import CountedStock
+from flightd.replay.tolerances import LAST_DIGITS, MOST_PIXELS
+from flightd.studies.counted_stock import counted_beside
 from flightd.studies.flight_calibration import calibrate_by_flight
 from flightd.vision.shelf.code_reader import read_codes
 
-_LAST_DIGITS: Final = 1e-9
-_PIXELS: Final = 0.5
-"""What `flightd replay` allows by itself."""
 _LOST_SHARE: Final = 0.02
 """Labels that the compression of the kept picture may cost."""
 _JUDGED_WITHIN: Final = 1e-6
@@ -52,7 +52,7 @@ def _detect(path: Path) -> Finding:
     seen = replay_pictures(path, detector_of(flown.config, flown.site)().detect)
     if not seen.pictures:
         return Finding(Outcome.NOTHING, "no recorded picture to see again")
-    return same_or(seen.complaint(_PIXELS), asdict(seen) | {"may_tip": seen.may_tip})
+    return same_or(seen.complaint(MOST_PIXELS), asdict(seen) | {"may_tip": seen.may_tip})
 
 
 def _replay(path: Path) -> Finding:
@@ -62,28 +62,23 @@ def _replay(path: Path) -> Finding:
     flown = recorded_setting(recorded)
     step = pilot_of(flown.config, flown.site, flown.order, flown.learnt).step
     decisions = replay_decisions(recorded, step)
-    complaint = ""
-    if decisions.missing:
-        complaint = f"{decisions.missing} ticks or decisions are missing in the log"
-    elif not decisions.within(_LAST_DIGITS):
+    complaint = decisions.complaint(LAST_DIGITS)
+    if complaint and not decisions.missing:
         first = min(decisions.drifts, key=lambda drift: (drift.first_s, drift.field))
-        complaint = (
-            f"{decisions.differing} of {decisions.ticks} decisions drift, "
-            f"first {first.field} at {first.first_s:.2f} s"
-        )
+        complaint += f", first {first.field} at {first.first_s:.2f} s"
     return same_or(complaint, comparison_document(decisions))
 
 
 def _codes(path: Path) -> Finding:
     if not (path.parent / "inventory.db").exists():
         return Finding(Outcome.NOTHING, "no inventory beside it")
-    with opened_for_reading(path.parent) as store:
-        kept = [(record, _kept(store.evidence.path, record)) for record in store.locations()]
+    counted = counted_beside(path, path.parent)
+    assert counted is not None
     pictures = gone = same = more = 0
     lost: list[str] = []
     other: list[str] = []
-    for record, picture in kept:
-        before = _texts(record)
+    for record in counted.records:
+        before, picture = _texts(record), _kept(counted, record)
         if picture is None:
             gone += bool(before)
             continue
@@ -114,17 +109,11 @@ def _texts(record: LocationRecord) -> set[str]:
     return {read.text for read in record.observation.reads} if record.observation else set()
 
 
-def _kept(
-    path_of: Callable[[str], Path], record: LocationRecord
-) -> np.ndarray[Any, np.dtype[np.uint8]] | None:
+def _kept(counted: CountedStock, record: LocationRecord) -> Image | None:
     """The picture that vouches for a place, None where none is kept or it cannot be read."""
-    if record.observation is None or not record.observation.evidence:
-        return None
-    try:
-        data = path_of(record.observation.evidence).read_bytes()
-    except (OSError, ValueError):
-        return None
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
+    name = record.observation.evidence if record.observation else ""
+    jpeg = counted.picture(name) if name else None
+    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if jpeg else None
     return None if picture is None else np.asarray(picture, np.uint8)
 
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flightd.core.errors import InputError
-from flightd.ground.access.people_book import is_name
-from flightd.ground.own_database import OwnDatabase
+from flightd.ground.access.people_book import access_database, check_name
 
 FILE = "keys.db"
 MOST_KEYS = 1000
@@ -54,16 +53,7 @@ class KeyBook:
     """Safe from any thread and any process; errors as of `PeopleBook`."""
 
     def __init__(self, state: Path) -> None:
-        self._database = OwnDatabase(
-            file=state / FILE,
-            holds="the keys",
-            application=_APPLICATION,
-            version=_VERSION,
-            schema=_SCHEMA,
-            remedy="be the user that the station runs as, or name another --state DIR",
-            timeout_s=5.0,
-            private=True,
-        )
+        self._database = access_database(state, FILE, "the keys", _APPLICATION, _VERSION, _SCHEMA)
 
     def all(self) -> list[ScopedKey]:
         """All of them, by name."""
@@ -75,10 +65,7 @@ class KeyBook:
 
     def make(self, name: str, hashed: bytes, scopes: frozenset[Scope]) -> None:
         """InputError for a name that is taken, or none."""
-        if not is_name(name):
-            raise InputError(
-                f"{name!r} is no name here", remedy="take up to 60 letters and digits, with . _ @ - between"
-            )
+        check_name(name)
         with self._database.changed() as book:
             if book.execute("SELECT count(*) FROM key").fetchone()[0] >= MOST_KEYS:
                 raise InputError(f"there are {MOST_KEYS} keys already")

@@ -35,9 +35,29 @@ CREATE TABLE session (
 """
 
 
-def is_name(text: str) -> bool:
-    """Whether a person or a program can be called that."""
-    return _NAME.fullmatch(text) is not None
+def check_name(name: str) -> None:
+    """InputError for what no person and no program can be called."""
+    if _NAME.fullmatch(name) is None:
+        raise InputError(
+            f"{name!r} is no name here",
+            remedy="take up to 60 letters and digits, with . _ @ - between them",
+        )
+
+
+def access_database(
+    state: Path, file: str, holds: str, application: int, version: int, schema: str
+) -> OwnDatabase:
+    """A file in the state folder that says who opens what: of nobody's but its owner's."""
+    return OwnDatabase(
+        file=state / file,
+        holds=holds,
+        application=application,
+        version=version,
+        schema=schema,
+        remedy="be the user that the station runs as, or name another --state DIR",
+        timeout_s=5.0,
+        private=True,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,16 +86,7 @@ class PeopleBook:
     UnavailableError where the disk refuses, InputError for a file that is another program's."""
 
     def __init__(self, state: Path) -> None:
-        self._database = OwnDatabase(
-            file=state / FILE,
-            holds="the people",
-            application=_APPLICATION,
-            version=_VERSION,
-            schema=_SCHEMA,
-            remedy="be the user that the station runs as, or name another --state DIR",
-            timeout_s=5.0,
-            private=True,
-        )
+        self._database = access_database(state, FILE, "the people", _APPLICATION, _VERSION, _SCHEMA)
         self.file = self._database.file
 
     def people(self) -> list[Person]:
@@ -95,11 +106,7 @@ class PeopleBook:
 
     def add(self, person: Person) -> None:
         """InputError for a name that is taken, or none."""
-        if not is_name(person.name):
-            raise InputError(
-                f"{person.name!r} is no name here",
-                remedy="take up to 60 letters and digits, with . _ @ - between them",
-            )
+        check_name(person.name)
         with self._database.changed() as book:
             if book.execute("SELECT count(*) FROM person").fetchone()[0] >= MOST_PEOPLE:
                 raise InputError(f"there are {MOST_PEOPLE} people already")

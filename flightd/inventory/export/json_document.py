@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 
 from flightd.core.inventory import LocationRecord, Observation
-from flightd.core.label_values import LEAST_CONFIDENCE, PlaceValue, told_number, told_text
+from flightd.core.label_values import LEAST_CONFIDENCE, PlaceValue, told_number
 from flightd.core.utc_time import utc_text
 from flightd.inventory.place_values import code_values, place_values
 
@@ -64,7 +64,7 @@ def _value_json(stands: PlaceValue) -> dict[str, object]:
     number = told_number(told.value)
     return {
         "kind": stands.kind.value,
-        "value": told_text(told.value) if number is None else number,
+        "value": told.text if number is None else number,
         "unit": told.unit,
         "source": told.source.value,
         "confidence": told.confidence,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from flightd.core.label_values import PlaceValue, ValueKind, told_number, told_text
+from flightd.core.label_values import PlaceValue, ValueKind, told_number
 
 UNKNOWN: Final = "unknown"
 """Something was read of it, and it is not sure what."""
@@ -37,7 +37,7 @@ def value_cells(values: Sequence[PlaceValue]) -> list[str | float]:
 def value_text(stands: PlaceValue) -> str:
     """One value for people: `net_length 1.25 m`."""
     told = stands.known
-    return f"{stands.kind} {f'{told_text(told.value)} {told.unit}'.strip() if told else UNKNOWN}"
+    return f"{stands.kind} {f'{told.text} {told.unit}'.strip() if told else UNKNOWN}"
 
 
 def _cell(stands: PlaceValue | None) -> str | float:
@@ -46,4 +46,4 @@ def _cell(stands: PlaceValue | None) -> str | float:
     if stands.known is None:
         return UNKNOWN
     number = told_number(stands.known.value)
-    return told_text(stands.known.value) if number is None else number
+    return stands.known.text if number is None else number

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from flightd.core.inventory import Observation
-from flightd.core.label_values import PlaceValue, ValueKind, told_number, told_text
+from flightd.core.label_values import PlaceValue, ValueKind, told_number
 from flightd.inventory.place_values import code_values, place_values
 
 _UNITS: Final = {
@@ -42,7 +42,7 @@ def _report(stands: PlaceValue, uri: str, base_uri: str) -> dict[str, Any]:
     report: dict[str, Any] = {"type": f"{base_uri}{stands.kind.value}"}
     number = told_number(told.value)
     if number is None:
-        report["stringValue"] = told_text(told.value)
+        report["stringValue"] = told.text
     else:
         report |= {"value": number} | ({"uom": _UNITS[told.unit]} if told.unit else {})
     return report | ({"uriValue": uri} if uri else {})

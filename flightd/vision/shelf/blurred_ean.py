@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from flightd.core.geometry import Matrix
 from flightd.core.types import Image
 from flightd.vision.shelf.bar_extents import bar_extents
-from flightd.vision.shelf.ean_profile import Place, ProfileRead, Start, read_again, read_profile, starts
+from flightd.vision.shelf.ean_profile import Place, ProfileRead, Start, best_start, read_again, read_profile
 from flightd.vision.shelf.ean_symbol import MODULES
 
 _Vector: TypeAlias = NDArray[np.float64]
@@ -195,13 +195,14 @@ def _corners(bands: list[_Band], reads: dict[int, ProfileRead], flipped: bool) -
 
 def _promising(bands: list[_Band]) -> Iterator[_Found]:
     """Where digits could be, the best first; modules of one width before those that grow on the way."""
+    extents = [(at, extent) for at in range(0, len(bands), 2) for extent in bar_extents(bands[at].profile)]
     for bends in _BENDS:
         found = []
-        for number, band in list(enumerate(bands))[::2]:
-            for extent, flipped in itertools.product(bar_extents(band.profile), (False, True)):
-                places = _places(extent, bends, len(band.profile) - 1 if flipped else None)
-                if places[0].module_px >= _LEAST_MODULE_PX:
-                    found.append(_Found(starts(_seen(band, flipped), places)[0], number, flipped))
+        for (number, extent), flipped in itertools.product(extents, (False, True)):
+            profile = _seen(bands[number], flipped)
+            places = _places(extent, bends, len(profile) - 1 if flipped else None)
+            if places[0].module_px >= _LEAST_MODULE_PX:
+                found.append(_Found(best_start(profile, places), number, flipped))
         likely = [one for one in found if one.start.score >= _LEAST_SCORE]
         yield from sorted(likely, key=lambda one: -one.start.score)[:_MOST_STARTS]
 

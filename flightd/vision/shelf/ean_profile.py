@@ -91,8 +91,8 @@ class Start(NamedTuple):
     right: Matrix
 
 
-def starts(profile: _Vector, places: Sequence[Place]) -> list[Start]:
-    """The best start of each blur, each digit alone at its best, best first."""
+def best_start(profile: _Vector, places: Sequence[Place]) -> Start:
+    """The best of all places and blurs, each digit alone at its best."""
     dark = -_sampled(profile, places)
     found = []
     for blur in _BLURS:
@@ -101,7 +101,7 @@ def starts(profile: _Vector, places: Sequence[Place]) -> list[Start]:
         scores = best_by_sets(left, right) / 12
         best = int(scores.argmax())
         found.append(Start(float(scores[best]), places[best], blur, left[best], right[best]))
-    return sorted(found, key=lambda start: -start.score)
+    return max(found, key=lambda start: start.score)
 
 
 def read_profile(profile: _Vector, start: Start) -> ProfileRead:
@@ -116,16 +116,13 @@ def read_again(profile: _Vector, known: ProfileRead, place: Place) -> ProfileRea
 
 
 def _settled(profile: _Vector, text: str, place: Place, blur: float) -> ProfileRead:
-    for _ in range(_ROUNDS):
+    for more in range(_ROUNDS, -1, -1):
         fit = _fitted(profile, text, place, blur)
         ranked = _ranked(fit, text)
         place, blur = fit.place, fit.blur
-        if ranked.text == text:
+        if ranked.text == text or not more:
             break
         text = ranked.text
-    else:
-        fit = _fitted(profile, text, place, blur)
-        ranked = _ranked(fit, text)
     noise = max(float(fit.rest @ fit.rest) / len(fit.rest) * _SAMPLES, 1e-9)
     spread = float(np.square(fit.seen - fit.seen.mean()).sum())
     explained = 1.0 - float(fit.rest @ fit.rest) / max(spread, 1e-9)
@@ -207,7 +204,12 @@ def _sampled(profile: _Vector, places: Sequence[Place]) -> Matrix:
 
 def _blurred_modules(blur: float) -> Matrix:
     """(samples, 95): how dark each dark module makes each sample."""
-    edges = (_AT[:, None] - np.arange(MODULES + 1)) / blur
+    return _darkened(_AT, MODULES, blur)
+
+
+def _darkened(at: _Vector, modules: int, blur: float) -> Matrix:
+    """(samples, modules): how dark each of so many modules makes the samples `at` these places."""
+    edges = (at[:, None] - np.arange(modules + 1)) / blur
     steps = np.interp(edges.ravel(), _STEEPS, _STEP_TABLE).reshape(edges.shape)
     return np.asarray(steps[:, :-1] - steps[:, 1:], np.float64)
 
@@ -227,10 +229,8 @@ def _drawn(digits: Matrix, blur: float) -> Matrix:
     """Rows of modules as samples, blurred."""
     modules = digits.shape[1]
     at = (np.arange(modules * _SAMPLES) + 0.5) / _SAMPLES + _GREY
-    edges = (at[:, None] - np.arange(modules + 2 * _GREY + 1)) / blur
-    steps = np.interp(edges.ravel(), _STEEPS, _STEP_TABLE).reshape(edges.shape)
     grey = np.full((len(digits), _GREY), 0.5)
-    drawn = np.hstack([grey, digits, grey]) @ (steps[:, :-1] - steps[:, 1:]).T
+    drawn = np.hstack([grey, digits, grey]) @ _darkened(at, modules + 2 * _GREY, blur).T
     drawn = drawn - drawn.mean(axis=1, keepdims=True)
     return np.asarray(drawn / np.linalg.norm(drawn, axis=1, keepdims=True), np.float64)
 
