@@ -8,7 +8,10 @@ import asyncio
 import queue
 import threading
 import time
+import traceback
+from collections.abc import Iterator
 from concurrent.futures import Future
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any, Self
 
@@ -33,6 +36,7 @@ from tests.sim.ideal.ideal_front import IdealFront
 from tests.sim.ideal.ideal_ports import HeldSetpoint, IdealVehicle, IdealVision
 
 _LOOK_S = 0.02
+_TELL_S = 0.1
 _FLIGHT_LIMIT_S = 3600.0
 
 
@@ -46,10 +50,12 @@ class _Mailbox(NoGround):
 
     def __init__(self) -> None:
         self.told: queue.SimpleQueue[Snapshot | Event] = queue.SimpleQueue()
+        self.newest: Snapshot | None = None
         self.orders: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self.quiet_s = 0.0
 
     def tell(self, snapshot: Snapshot) -> None:
+        self.newest = snapshot
         self.told.put(snapshot)
 
     def event(self, event: Event) -> None:
@@ -73,21 +79,19 @@ class _PacedFlight(IdealFlight):
     ) -> None:
         super().__init__(site, config, front=front)
         self._mailbox = mailbox
-        self._speed = speed
-        self._began = (time.monotonic(), self.now_ns())
-        self._over = threading.Event()
+        self._pace = (time.monotonic(), self.now_ns(), speed)
+        self.over = threading.Event()
         self.seen: tuple[LineSet, Kinematics] | None = None
         self.phase = Phase.PREFLIGHT
         self.on_tick = self._keep_pace
 
     def pace(self, speed: float) -> None:
         """From now on so many times as fast as the clock."""
-        self._began = (time.monotonic(), self.now_ns())
-        self._speed = speed
+        self._pace = (time.monotonic(), self.now_ns(), speed)
 
     def end(self) -> None:
         """Leave the flight at its next tick."""
-        self._over.set()
+        self.over.set()
 
     def _composed(self, vehicle: IdealVehicle, vision: IdealVision, setpoints: HeldSetpoint) -> Flight:
         alone, box = super()._composed(vehicle, vision, setpoints), self._mailbox
@@ -101,8 +105,9 @@ class _PacedFlight(IdealFlight):
 
     def _keep_pace(self, phase: Phase, now_ns: int) -> None:
         self.phase = phase
-        ahead_s = (now_ns - self._began[1]) * 1e-9 / self._speed - (time.monotonic() - self._began[0])
-        if self._over.wait(max(ahead_s, 0.0)):
+        began_s, began_ns, speed = self._pace  # once: another thread sets it
+        ahead_s = (now_ns - began_ns) * 1e-9 / speed - (time.monotonic() - began_s)
+        if self.over.wait(max(ahead_s, 0.0)):
             raise _Ended
 
 
@@ -126,6 +131,7 @@ class LiveFlight:
         self._lens = config.camera.lens()
         self._ports: Future[tuple[int, int]] = Future()
         self._ending = threading.Event()
+        self._failed: list[str] = []
         self._threads = [
             threading.Thread(target=target, name=name, daemon=True)
             for name, target in (("link", self._serve), ("flight", self._fly))
@@ -143,6 +149,7 @@ class LiveFlight:
         for thread in self._threads:
             thread.join(20)
             assert not thread.is_alive(), f"the {thread.name} does not end"
+        assert not self._failed, "\n".join(self._failed)
 
     @property
     def ports(self) -> tuple[int, int]:
@@ -183,13 +190,25 @@ class LiveFlight:
         self._flight.end()
 
     def _fly(self) -> None:
-        try:
+        with suppress(_Ended), self._told():
             self._flight.fly(_FLIGHT_LIMIT_S)
-        except _Ended:
-            return
+            while self._mailbox.newest is not None and not self._flight.over.wait(_TELL_S):
+                self._mailbox.tell(self._mailbox.newest)  # a daemon on the floor tells on how it ended
 
     def _serve(self) -> None:
-        real(self._on_link())
+        with self._told():
+            real(self._on_link())
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """What ends one of the threads fails whoever leaves the flight."""
+        try:
+            yield
+        except _Ended:
+            raise
+        except Exception:
+            self._failed.append(traceback.format_exc())
+            raise
 
     async def _on_link(self) -> None:
         with self._link as link:

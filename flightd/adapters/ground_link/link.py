@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from typing import Any, Self, TypeAlias
@@ -253,9 +254,9 @@ class ZmqGround:
             taken_s = 0.0
             for _ in range(_REQUESTS_AT_ONCE):
                 frames = await self._requests.recv_multipart(copy=False)
-                began_ns = self._clock.now_ns()
+                began_s = time.perf_counter()  # the loop's time, whatever clock the flight goes by
                 self._take(frames)
-                taken_s += (self._clock.now_ns() - began_ns) * 1e-9
+                taken_s += time.perf_counter() - began_s
                 if taken_s > _TURN_S:
                     break
             await asyncio.sleep(max(_REST_S, _REST_SHARE * taken_s))
