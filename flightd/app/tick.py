@@ -22,6 +22,8 @@ class Tick:
         self._call = flight.publishers.barrier.call
         self._step = GuardedStep(flight.pilot)
         self._last = LastAnswers()
+        # once: to look for a protocol's members takes as long as a tick's whole status
+        self._counts_drops = flight.vehicle if isinstance(flight.vehicle, CountsDrops) else None
 
     @property
     def output(self) -> TickOutput:
@@ -109,8 +111,8 @@ class Tick:
         dropped["recorder"] = flight.recorder.dropped
         dropped["refused"] = flight.camera.refused + flight.front_camera.refused
         dropped["setpoints"] = flight.setpoints.failed
-        if isinstance(flight.vehicle, CountsDrops):
-            dropped["vehicle"] = flight.vehicle.dropped
+        if self._counts_drops is not None:
+            dropped["vehicle"] = self._counts_drops.dropped
         return Snapshot(
             tick,
             output,
