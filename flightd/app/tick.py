@@ -6,9 +6,11 @@ from flightd.adapters.store.progress import LeftOver
 from flightd.app.flight import Flight
 from flightd.app.guarded_step import GuardedStep
 from flightd.app.last_answers import LastAnswers
+from flightd.core.flight_order import ChosenPlan
 from flightd.core.outlook import NO_OUTLOOK
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
+from flightd.core.topics import Topic
 from flightd.core.types import Command, CommandKind, Health
 from flightd.ports import CountsDrops
 
@@ -39,6 +41,8 @@ class Tick:
         tick = self._gather(now_ns)
         output = self._step.step(tick)
         self._obey(output)
+        if any(command.kind is CommandKind.PLAN for command in tick.commands):
+            self._call("recorder", lambda: self._record_plan(now_ns), None)
         self._call(
             "status", lambda: self._flight.publishers.publish(self._snapshot(tick, output, late_s)), None
         )
@@ -100,6 +104,12 @@ class Tick:
         self._flight.progress.put(LeftOver(pilot.mission.remaining, *pilot.mission.stand))
         if pilot.learnt is not None:
             self._flight.learnt.put(pilot.learnt)
+
+    def _record_plan(self, now_ns: int) -> None:
+        """What is flown in the order's place, for whoever reads the log."""
+        standing = self._flight.pilot.mission.standing
+        chosen = ChosenPlan(standing.id, standing.nodes if standing.id else (), standing.levels)
+        self._flight.recorder.record(Topic.PLAN, now_ns, chosen)
 
     def _possible_commands(self) -> frozenset[CommandKind]:
         return frozenset() if self._step.escaped else self._flight.pilot.possible_commands
