@@ -12,7 +12,7 @@ import typer
 
 from flightd.cli.options import AsJson
 from flightd.cli.store.options import opened
-from flightd.core.errors import FlightdError, RunError
+from flightd.core.errors import RunError
 
 if TYPE_CHECKING:
     from flightd.ground.wms_exchange.exchange import Exchange, Exchanged

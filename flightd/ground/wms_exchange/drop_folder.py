@@ -31,14 +31,13 @@ class DropFolder:
 
     def __init__(self, address: str, file: Path, key: str) -> None:
         """InputError where there is no such folder."""
-        self._where = {"file": file, "key": key}
+        self._file, self._key = file, key
         self.address = address
         with self._refusals("cannot be opened"):
-            self._files, self._path = _file_system(address, self._where)
+            self._files, self._path = file_system(address, file, key)
             if not self._files.isdir(self._path):
-                raise InputError(
-                    f"{address}: there is no such folder", **self._where, remedy="make it, or correct the key"
-                )
+                remedy = "make it, or correct the key"
+                raise InputError(f"{address}: there is no such folder", file=file, key=key, remedy=remedy)
 
     def close(self) -> None:
         """Of a connection."""
@@ -107,33 +106,39 @@ class DropFolder:
     def _refusals(self, what: str) -> Iterator[None]:
         try:
             yield
-        except (OSError, EOFError, ValueError, ImportError, *_ssh_errors()) as err:
+        except _refused_by() as err:
             text = getattr(err, "strerror", None) or str(err) or type(err).__name__
             raise UnavailableError(
-                f"{self.address}: {what}: {text}", **self._where, remedy="may flightd read and write there?"
+                f"{self.address}: {what}: {text}",
+                file=self._file,
+                key=self._key,
+                remedy="may flightd read and write there?",
             ) from None
 
 
-def _file_system(address: str, where: dict[str, Any]) -> tuple[Any, str]:
+def file_system(address: str, file: Path, key: str) -> tuple[Any, str]:
     """The file system of a folder or URL, and the path on it."""
     try:
         import fsspec
     except ModuleNotFoundError:
         raise missing_extra("sftp", "flightd store exchange") from None
     if urlsplit(address).scheme in {"sftp", "ssh"}:
-        return _sftp(address, where)
+        return _sftp(address, file, key)
     files, path = fsspec.core.url_to_fs(address, skip_instance_cache=True)
     return files, str(path)
 
 
-def _sftp(address: str, where: dict[str, Any]) -> tuple[Any, str]:
+def _sftp(address: str, file: Path, key: str) -> tuple[Any, str]:
     parts = urlsplit(address)
     if parts.password:
         raise InputError(
-            "a password does not belong into the file", **where, remedy=f"give it in {PASSWORD}, or use a key"
+            "a password does not belong into the file",
+            file=file,
+            key=key,
+            remedy=f"give it in {PASSWORD}, or use a key",
         )
     if not parts.hostname or not parts.path:
-        raise InputError("not the URL of a folder", **where, remedy="give sftp://USER@HOST/FOLDER")
+        raise InputError("not the URL of a folder", file=file, key=key, remedy="give sftp://USER@HOST/FOLDER")
     try:
         from flightd.ground.wms_exchange.known_host_sftp import KnownHostSftp
     except ModuleNotFoundError:
@@ -143,7 +148,8 @@ def _sftp(address: str, where: dict[str, Any]) -> tuple[Any, str]:
     return KnownHostSftp(parts.hostname, skip_instance_cache=True, **asked), parts.path
 
 
-def _ssh_errors() -> tuple[type[Exception], ...]:
-    """Those of paramiko where it is in use."""
+def _refused_by() -> tuple[type[Exception], ...]:
+    """What file systems raise; paramiko's own where it is in use."""
     paramiko = sys.modules.get("paramiko")
-    return () if paramiko is None else (paramiko.SSHException,)
+    ssh = () if paramiko is None else (paramiko.SSHException,)
+    return (OSError, EOFError, ValueError, ImportError, *ssh)

@@ -84,8 +84,11 @@ def load_exchange(path: Path) -> ExchangeFile:
     try:
         file = ExchangeFile.model_validate(load_table(path))
     except ValidationError as err:
-        more = f" (and {len(err.errors()) - 1} more)" if len(err.errors()) > 1 else ""
-        raise InputError(f"{complaint(err.errors()[0], ExchangeFile)}{more}", file=path) from None
+        found = sorted(
+            err.errors(), key=lambda error: error["type"] != "extra_forbidden"
+        )  # a misspelt key first
+        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        raise InputError(f"{complaint(found[0], ExchangeFile)}{more}", file=path) from None
     expected, counts = file.expected, file.counts
     if expected is None and counts is None:
         raise InputError(

@@ -20,7 +20,7 @@ class KnownHostSftp(SFTPFileSystem):  # type: ignore[misc]
     def _connect(self) -> None:
         self.client = paramiko.SSHClient()
         self.client.load_system_host_keys()
-        self.client.set_missing_host_key_policy(_Unknown())
+        self.client.set_missing_host_key_policy(paramiko.RejectPolicy())
         try:
             self.client.connect(
                 self.host, timeout=_WAIT_S, banner_timeout=_WAIT_S, auth_timeout=_WAIT_S, **self.ssh_kwargs
@@ -30,8 +30,3 @@ class KnownHostSftp(SFTPFileSystem):  # type: ignore[misc]
         except BaseException:
             self.client.close()
             raise
-
-
-class _Unknown(paramiko.MissingHostKeyPolicy):
-    def missing_host_key(self, client: object, hostname: str, key: object) -> None:  # noqa: ARG002
-        raise paramiko.SSHException(f"the host key of {hostname} is not known: add it to ~/.ssh/known_hosts")
