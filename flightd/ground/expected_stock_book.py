@@ -28,11 +28,10 @@ _TABLE = """CREATE TABLE IF NOT EXISTS expected_stock (
 ) STRICT"""
 """Made with the first upload: files from before it are kept as they are."""
 _DROP_TABLE = """CREATE TABLE IF NOT EXISTS expected_stock_drop (
-    inbox TEXT NOT NULL,
+    inbox TEXT PRIMARY KEY,
     name TEXT NOT NULL,
     sha256 TEXT NOT NULL,
-    said TEXT NOT NULL,
-    PRIMARY KEY (inbox, name)
+    said TEXT NOT NULL
 ) STRICT"""
 _ONE = """SELECT name, who, utc_ns, changed_ns, place, code, quantity, heading FROM expected_stock
 WHERE store = ?"""
@@ -52,8 +51,8 @@ class ExpectedStock:
 
 @dataclass(frozen=True, slots=True)
 class Drop:
-    """A file of a drop folder whose content is kept, and which may lie there still: by `name` and `sha256`
-    in `inbox`; `said` is what whoever dropped it is told."""
+    """The newest file of an `inbox` whose content is kept, and which may lie there still, by `name` and
+    `sha256`; `said` is what whoever dropped it is told."""
 
     inbox: str
     name: str
@@ -86,17 +85,17 @@ class ExpectedStockBook:
                 row = (drop.inbox, drop.name, drop.sha256, drop.said)
                 book.execute("INSERT OR REPLACE INTO expected_stock_drop VALUES (?, ?, ?, ?)", row)
 
-    def dropped(self, inbox: str, name: str) -> Drop | None:
+    def dropped(self, inbox: str) -> Drop | None:
         """What is noted of a file that may lie in the inbox still."""
-        question = "SELECT inbox, name, sha256, said FROM expected_stock_drop WHERE inbox = ? AND name = ?"
-        row = self._read("expected_stock_drop", question, inbox, name)
+        question = "SELECT inbox, name, sha256, said FROM expected_stock_drop WHERE inbox = ?"
+        row = self._read("expected_stock_drop", question, inbox)
         return None if row is None else Drop(*row)
 
-    def moved(self, inbox: str, name: str) -> None:
-        """The file lies there no more: one of the same name and content is another from now on."""
-        with self._database.changed() as book:
-            book.execute(_DROP_TABLE)
-            book.execute("DELETE FROM expected_stock_drop WHERE inbox = ? AND name = ?", (inbox, name))
+    def moved(self, inbox: str) -> None:
+        """That file lies there no more: one of the same name and content is another from now on."""
+        if self.dropped(inbox) is not None:
+            with self._database.changed() as book:
+                book.execute("DELETE FROM expected_stock_drop WHERE inbox = ?", (inbox,))
 
     def choose(self, store: str, columns: StockColumns, changed_ns: int) -> None:
         """The store's upload has other columns from now on; nothing where there is none any more."""

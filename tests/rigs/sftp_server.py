@@ -1,4 +1,4 @@
-"""A server of SFTP on this machine, made of paramiko's: everything below `/`, for whoever has the password."""
+"""A server of SFTP on this machine, made of paramiko's: all below `/`, for whoever has the password."""
 
 from __future__ import annotations
 

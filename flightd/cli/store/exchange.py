@@ -45,9 +45,10 @@ def exchange(
 ) -> None:
     """Take expected stock out of a drop folder, and put counts that changed into another, as CSV.
 
-    Folders are here, or URLs such as sftp://USER@HOST/FOLDER (extra `sftp`).  However often it is cut and
-    begun again, no file is taken twice, no count is lost, and the same name has the same content.  A file
-    that is refused lies in refused/, with the reason beside it, and ends a single pass with exit 1.
+    Folders are here, or URLs such as sftp://USER@HOST/FOLDER; it needs the extra `exchange`.  However often
+    it is cut and begun again, no file is taken twice, no count is lost, and the same name has the same
+    content.  A file that is refused lies in refused/ with the reason beside it; a single pass ends with
+    exit 1 then.
 
     \b
     Examples:

@@ -36,6 +36,7 @@ class DropFolder:
         with self._refusals("cannot be opened"):
             self._files, self._path = file_system(address, file, key)
             if not self._files.isdir(self._path):
+                self.close()
                 remedy = "make it, or correct the key"
                 raise InputError(f"{address}: there is no such folder", file=file, key=key, remedy=remedy)
 
@@ -121,7 +122,7 @@ def file_system(address: str, file: Path, key: str) -> tuple[Any, str]:
     try:
         import fsspec
     except ModuleNotFoundError:
-        raise missing_extra("sftp", "flightd store exchange") from None
+        raise missing_extra("exchange", "flightd store exchange") from None
     if urlsplit(address).scheme in {"sftp", "ssh"}:
         return _sftp(address, file, key)
     files, path = fsspec.core.url_to_fs(address, skip_instance_cache=True)
@@ -142,7 +143,7 @@ def _sftp(address: str, file: Path, key: str) -> tuple[Any, str]:
     try:
         from flightd.ground.wms_exchange.known_host_sftp import KnownHostSftp
     except ModuleNotFoundError:
-        raise missing_extra("sftp", "sftp://…") from None
+        raise missing_extra("exchange", "sftp://…") from None
     given = {"port": parts.port, "username": parts.username, "password": os.environ.get(PASSWORD)}
     asked = {name: value for name, value in given.items() if value}
     return KnownHostSftp(parts.hostname, skip_instance_cache=True, **asked), parts.path

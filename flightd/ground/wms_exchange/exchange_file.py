@@ -47,7 +47,7 @@ class ExpectedSection(Section):
     pattern: str = Field(default="*.csv", min_length=1, description="Of their names, whatever the case")
     folder: Path = Field(description="The station's folder, as of `flightd ground --folder`")
     inventory: str = Field(default=".", description="Of which inventory in it")
-    settle_s: float = Field(default=2.0, ge=0.0, le=600.0, description="So long a file has to stay as it is")
+    settle_s: float = Field(default=10.0, ge=0.0, le=600.0, description="So long a file has to stay as it is")
     columns: StockNames
 
 

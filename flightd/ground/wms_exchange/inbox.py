@@ -45,6 +45,7 @@ class Inbox:
         self._folder = folder
         self._asked = asked
         self._who = who
+        self._id = f"{asked.inbox}/{asked.pattern}"
         self._utc_ns = utc_ns
         try:
             records = Stores(asked.folder).view(asked.inventory).records
@@ -60,22 +61,23 @@ class Inbox:
 
     def take(self, sleep: Callable[[float], None]) -> Iterator[TakenFile]:
         """What was begun before, then what is new, oldest first; what is written still stays."""
-        for name in sorted(self._folder.listed(_TAKING)):
+        for name in sorted(self._listed(_TAKING)):
             yield self._finish(name)
-        before = self._new()
+        self._book.moved(self._id)
+        before = self._listed()
         if not before:
             return
         sleep(self._asked.settle_s)
-        whole = {name: stamp for name, stamp in self._new().items() if before.get(name) == stamp}
+        whole = {name: stamp for name, stamp in self._listed().items() if before.get(name) == stamp}
         for name in sorted(whole, key=lambda name: (whole[name][1], name)):
             self._folder.move(name, f"{_TAKING}/{name}")
             yield self._finish(name)
 
-    def _new(self) -> dict[str, Stamp]:
+    def _listed(self, below: str = "") -> dict[str, Stamp]:
         pattern = self._asked.pattern.casefold()
         return {
             name: stamp
-            for name, stamp in self._folder.listed().items()
+            for name, stamp in self._folder.listed(below).items()
             if fnmatchcase(name.casefold(), pattern)
         }
 
@@ -83,8 +85,8 @@ class Inbox:
         """A claimed file, wherever it was cut before."""
         data = self._folder.read(f"{_TAKING}/{name}", MOST_BYTES + 1)
         digest = hashlib.sha256(data).hexdigest()
-        known = self._book.dropped(self._folder.address, name)
-        if known is not None and known.sha256 == digest:
+        known = self._book.dropped(self._id)
+        if known is not None and (known.name, known.sha256) == (name, digest):
             taken = TakenFile(name, True, known.said)
         else:
             taken = self._judged(name, data, digest)
@@ -92,8 +94,7 @@ class Inbox:
         to = f"{_DONE if taken.taken else _REFUSED}/{path.stem}-{digest[:8]}{path.suffix}"
         self._folder.write(f"{to}.txt", f"{taken.said}\n".encode())
         self._folder.move(f"{_TAKING}/{name}", to)
-        if taken.taken:
-            self._book.moved(self._folder.address, name)
+        self._book.moved(self._id)
         return taken
 
     def _judged(self, name: str, data: bytes, digest: str) -> TakenFile:
@@ -106,7 +107,7 @@ class Inbox:
             return TakenFile(name, False, str(err))
         now = self._utc_ns()
         upload = ExpectedStock(name[:_MOST_NAME], self._who, now, now, columns)
-        drop = Drop(self._folder.address, name, digest, said)
+        drop = Drop(self._id, name, digest, said)
         self._book.keep(self._asked.inventory, upload, data, drop)
         return TakenFile(name, True, said)
 

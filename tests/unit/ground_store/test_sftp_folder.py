@@ -10,7 +10,7 @@ import pytest
 from flightd.core.errors import UnavailableError
 from flightd.ground.wms_exchange.drop_folder import PASSWORD, DropFolder
 
-pytest.importorskip("paramiko", reason="folders over SFTP need it: pip install -e '.[sftp]'")
+pytest.importorskip("paramiko", reason="folders over SFTP need it: pip install -e '.[exchange]'")
 
 
 @pytest.fixture
