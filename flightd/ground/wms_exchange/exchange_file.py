@@ -46,7 +46,8 @@ class ExpectedSection(Section):
     inbox: str = Field(min_length=1, description="Folder, or URL of one")
     pattern: str = Field(default="*.csv", min_length=1, description="Of their names, whatever the case")
     folder: Path = Field(description="The station's folder, as of `flightd ground --folder`")
-    inventory: str = Field(default=".", description="Of which inventory in it")
+    flights: tuple[Path, ...] = Field(default=(), description="And as of its `--flights`")
+    inventory: str = Field(default=".", description="Of which inventory in them")
     settle_s: float = Field(default=10.0, ge=0.0, le=600.0, description="So long a file has to stay as it is")
     columns: StockNames
 
@@ -96,8 +97,9 @@ def load_exchange(path: Path) -> ExchangeFile:
         )
     here = path.resolve().parent
     if expected is not None:
-        moved = {"inbox": _address(here, expected.inbox), "folder": here / expected.folder}
-        expected = expected.model_copy(update=moved)
+        inbox, folder = _address(here, expected.inbox), here / expected.folder
+        flights = tuple(here / path for path in expected.flights)
+        expected = expected.model_copy(update={"inbox": inbox, "folder": folder, "flights": flights})
     if counts is not None:
         counts = counts.model_copy(update={"outbox": _address(here, counts.outbox)})
     return file.model_copy(update={"expected": expected, "counts": counts})

@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 
 from flightd.core.errors import InputError
 from flightd.ground.expected_stock_book import Drop, ExpectedStock, ExpectedStockBook
+from flightd.ground.read_folders import read_folders
 from flightd.ground.stores import Stores
 from flightd.ground.wms_exchange.drop_folder import DropFolder, Stamp
 from flightd.ground.wms_exchange.exchange_file import ExpectedSection, StockNames
@@ -47,14 +48,16 @@ class Inbox:
         self._who = who
         self._id = f"{asked.inbox}/{asked.pattern}"
         self._utc_ns = utc_ns
+        stores = Stores(asked.folder, read_folders(asked.flights))
         try:
-            records = Stores(asked.folder).view(asked.inventory).records
+            records = stores.view(asked.inventory).records
         except InputError as err:
+            there = _shown([name for name, _ in stores.names()])
             raise InputError(
                 f"{asked.folder}: {err.what}",
                 file=file,
                 key="expected.inventory",
-                remedy="give the name that the page Stock has for it, and the station's folder",
+                remedy=f"choose among {there}" if there else "is it the station's folder?",
             ) from None
         self._places = {record.code.casefold() for record in records}
         self._book = ExpectedStockBook(asked.folder)

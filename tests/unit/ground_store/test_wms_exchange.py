@@ -339,6 +339,17 @@ def test_what_is_of_no_use_is_refused_with_one_line_beside_it(place: Path, text:
     assert ExpectedStockBook(place / "station").kept(".") is None
 
 
+def test_an_inventory_that_the_station_reads_elsewhere_has_its_prefix(place: Path) -> None:
+    (place / "station").rename(place / "drones")
+    (place / "station").mkdir()
+    (place / "in" / "s.csv").write_text("LGPLA;NVE;MENGE\nA-1;PAL-1;1\n")
+    elsewhere = EXPECTED.replace("settle_s", 'flights = ["drones"]\nsettle_s')
+    (failure,) = exchange(place, elsewhere).once().failures
+    assert str(failure).endswith("there is no inventory '.'; choose among drones:.")
+    assert once(place, elsewhere.replace("settle_s", 'inventory = "drones:."\nsettle_s')).files[0].taken
+    assert ExpectedStockBook(place / "station").kept("drones:.") is not None
+
+
 def test_what_is_left_out_is_said(place: Path) -> None:
     (place / "in" / "s.csv").write_text("LGPLA;NVE;MENGE\nA-1;PAL-1;1\nA-2;PAL-2;many\nB-1;PAL-3;1\n")
     (file,) = once(place, EXPECTED).files
