@@ -66,14 +66,14 @@ class Exchange:
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
     """Nobody else exchanges by this file meanwhile.  UnavailableError where somebody does."""
-    try:
-        with path.open("rb") as file:
+    with path.open("rb") as file:
+        try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            yield
-    except BlockingIOError:
-        raise UnavailableError(
-            "another process exchanges by this file", file=path, remedy="wait until it is done"
-        ) from None
+        except BlockingIOError:
+            raise UnavailableError(
+                "another process exchanges by this file", file=path, remedy="wait until it is done"
+            ) from None
+        yield
 
 
 @contextmanager
