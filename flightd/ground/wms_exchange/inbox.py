@@ -97,7 +97,6 @@ class Inbox:
         to = f"{_DONE if taken.taken else _REFUSED}/{path.stem}-{digest[:8]}{path.suffix}"
         self._folder.write(f"{to}.txt", f"{taken.said}\n".encode())
         self._folder.move(f"{_TAKING}/{name}", to)
-        self._book.moved(self._id)
         return taken
 
     def _judged(self, name: str, data: bytes, digest: str) -> TakenFile:

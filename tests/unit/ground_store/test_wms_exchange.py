@@ -18,6 +18,7 @@ from flightd.ground.expected_stock_book import ExpectedStock, ExpectedStockBook
 from flightd.ground.ground_store import outbox
 from flightd.ground.ground_store.batch import Batch, SentLook
 from flightd.ground.ground_store.store import GroundStore
+from flightd.ground.uploaded_comparison import column_words, compare_upload
 from flightd.ground.wms_exchange import drop_folder
 from flightd.ground.wms_exchange.exchange import Exchange, Exchanged, alone
 from flightd.ground.wms_exchange.exchange_file import load_exchange
@@ -297,6 +298,23 @@ def test_the_newest_file_is_kept_and_one_that_comes_again_is_taken_again(place: 
         assert kept(place)[1].decode().splitlines()[1] == text
     assert len(lying(place / "in")) == 4
     assert once(place, EXPECTED).files == []
+    upload, data = kept(place)
+    other = data.replace(b"PAL-1", b"PAL-3")
+    ExpectedStockBook(place / "station").keep(".", upload, other)  # somebody, at the page
+    (place / "in" / "stock.csv").write_bytes(data)
+    assert once(place, EXPECTED).files[0].taken
+    assert kept(place)[1] == data
+
+
+def test_the_page_compares_with_what_was_dropped(place: Path) -> None:
+    (place / "in" / "s.csv").write_text("LGPLA;NVE;MENGE\na-1;PAL-1;12\n")
+    once(place, EXPECTED)
+    upload, data = kept(place)
+    (place / "s.csv").write_bytes(data)
+    told = json.loads(
+        compare_upload(place / "station", place / "s.csv", column_words(upload.columns)).content
+    )
+    assert (told["rows"], told["unknown_places"], told["outcome_counts"]["uncounted"]) == (1, [], 1)
 
 
 def test_a_file_that_is_written_still_is_left_alone(place: Path) -> None:
