@@ -3,7 +3,7 @@ what each may fly next.  Pure: a step from reports to commands."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -111,6 +111,37 @@ class Dispatcher:
         for node in nodes:
             self._shut.pop(node, None)
         self.queue.retry(nodes)
+
+    def withdraw(self, drone: str, place: int, air: Collection[int], now_ms: int) -> None:
+        """A drone is flown by somebody else, near `place` and anywhere in `air`: what it had to count is
+        given to others, who fly round it (`TrafficControl.roam`).  Again whenever its air has changed."""
+        before = self._near(drone)
+        self._held |= set(self.control.roam(drone, place, air, now_ms))
+        self._held.discard(drone)
+        self._avoided.discard(drone)
+        self._waits_since_ms.pop(drone, None)
+        self.queue.hand_back(self._tours.pop(drone, set()))
+        self._settle_tours()
+        self._free(before - self._near(drone))
+
+    def readmit(self, drone: str, place: int, pad: int, now_ms: int) -> bool:
+        """It is the fleet's again, where it stands or hovers, and comes home to `pad`.  False, and nothing has
+        changed, as long as somebody else is to come there."""
+        if not self.control.may_enter(drone, place):
+            return False
+        freed = self._near(drone)
+        self.control.enter(drone, place, ends=(pad,))
+        self._heard_ms[drone] = now_ms
+        if place != pad:
+            self._held |= set(self.control.replan([drone], now_ms))
+        self._free(freed)
+        return True
+
+    def _free(self, nodes: Collection[str]) -> None:
+        """Drones may come there again."""
+        if nodes:
+            self._tries.clear()
+            self.queue.retry(nodes)
 
     def _hear(self, report: DroneReport, now_ms: int) -> None:
         drone, course = report.drone, self.control.drones[report.drone]
@@ -256,9 +287,9 @@ class Dispatcher:
         left_ms = self._endurance.left_ms(self._charge[drone])
         budget_ms = int(left_ms / (_SLOWER * (1 + _SPARE_FRAC)))
         busy = {self.queue.work(node).aisle for node in self.queue.given}
-        nodes = self.queue.tour(self._times(course.place), budget_ms, busy)
+        nodes = self.queue.tour(self._times(course.place, course.ends[0]), budget_ms, busy, drone=drone)
         while nodes:
-            if not self.control.give(drone, [self._stop(node) for node in nodes], (course.place,), now_ms):
+            if not self.control.give(drone, [self._stop(node) for node in nodes], course.ends, now_ms):
                 self._refused(nodes)
                 nodes = nodes[: len(nodes) // 2]
                 continue
@@ -267,7 +298,7 @@ class Dispatcher:
                 self.queue.take(drone, nodes)
                 self._tours.setdefault(drone, set()).update(nodes)
                 return True
-            self.control.give(drone, (), (course.place,), now_ms)
+            self.control.give(drone, (), course.ends, now_ms)
             nodes = nodes[: len(nodes) * 3 // 4]
         return False
 
@@ -282,7 +313,7 @@ class Dispatcher:
         lanes = self.control.lanes
         return Stop(lanes.over(node), lanes.column_of[node], self.queue.work(node).dwell_ms)
 
-    def _times(self, pad: int) -> TourTimes:
+    def _times(self, place: int, pad: int) -> TourTimes:
         lanes, distances, net = self.control.lanes, self._distances, self.control.net
         stop_ms = net.launch_ms + net.stop_ms
         home = distances.to(pad)
@@ -291,6 +322,6 @@ class Dispatcher:
             return distances.to(lanes.over(b))[lanes.over(a)] + stop_ms
 
         def out_ms(node: str) -> int:
-            return distances.to(lanes.over(node))[pad] + 4 * stop_ms
+            return distances.to(lanes.over(node))[place] + 4 * stop_ms
 
         return TourTimes(out_ms, between_ms, lambda node: home[lanes.over(node)] + 4 * stop_ms)
