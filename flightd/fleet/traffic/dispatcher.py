@@ -125,7 +125,7 @@ class Dispatcher:
         self._free(before - self._near(drone))
 
     def readmit(self, drone: str, place: int, pad: int, now_ms: int) -> bool:
-        """It is the fleet's again, where it stands or hovers, and comes home to `pad`.  False, and nothing has
+        """It is the fleet's again, where it stands or hovers, and comes home to `pad`.  False, with nothing
         changed, as long as somebody else is to come there."""
         if not self.control.may_enter(drone, place):
             return False

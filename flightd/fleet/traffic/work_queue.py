@@ -116,8 +116,8 @@ class WorkQueue:
         most: int = 40,
         drone: str = "",
     ) -> tuple[str, ...]:
-        """The nodes of one tour of a drone within a budget: first the most valuable aisle that nobody flies in, from its
-        nearer end on, then what lies nearest.  Empty where nothing fits."""
+        """The nodes of one tour of a drone within a budget: first the most valuable aisle that nobody flies
+        in, from its nearer end on, then what lies nearest.  Empty where nothing fits."""
         aisles: dict[str, list[NodeWork]] = {}
         for node in self._open:
             work = self._work[node]
