@@ -170,7 +170,7 @@ class LiveFlight:
     def at_m(self) -> tuple[float, float, float]:
         """Where it really is: along the aisles, to their right, above the floor."""
         frame = self._flight.airframe
-        return frame.x_m, frame.y_m, frame.z_m
+        return frame.x_m, frame.y_m, frame.height_m
 
     @property
     def quiet_s(self) -> float:

@@ -121,7 +121,9 @@ def ground(
     mqtt_version: Annotated[str, typer.Option(metavar="VERSION", help="Of VDA 5050: 2.1 or 3.0.")] = "2.1",
     mqtt_body: Annotated[
         str,
-        typer.Option(metavar="LxWxH", help="The drones' size with propellers, m: for their factsheets, and for --fleet."),
+        typer.Option(
+            metavar="LxWxH", help="The drones' size with propellers, m: for factsheets and --fleet."
+        ),
     ] = "0.6x0.6x0.3",
     mqtt_orders: Annotated[
         bool,

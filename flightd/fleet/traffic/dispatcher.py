@@ -3,6 +3,7 @@ what each may fly next.  Pure: a step from reports to commands."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -11,7 +12,7 @@ from flightd.fleet.traffic.distances import Distances
 from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action, Stop
 from flightd.fleet.traffic.traffic_control import TrafficControl
-from flightd.fleet.traffic.work_queue import TourTimes, WorkQueue
+from flightd.fleet.traffic.work_queue import MOST_OF_TOUR, TourTimes, WorkQueue
 
 _DOUBT_LASTS_MS: Final = 20_000
 SILENT_MS: Final = 90_000
@@ -63,9 +64,13 @@ class Commands:
 
 
 class Dispatcher:
-    """The fleet of one floor."""
+    """The fleet of one floor.  With `shares` no drone is given more than its part of what waits, for all that
+    could fly now."""
 
-    def __init__(self, control: TrafficControl, queue: WorkQueue, endurance: Endurance) -> None:
+    def __init__(
+        self, control: TrafficControl, queue: WorkQueue, endurance: Endurance, *, shares: bool = False
+    ) -> None:
+        self._shares = shares
         self.control = control
         self.queue = queue
         self._endurance = endurance
@@ -274,20 +279,25 @@ class Dispatcher:
             self._replanned(held, now_ms)
 
     def _give_tours(self, now_ms: int) -> None:
-        for drone, course in self.control.drones.items():
-            idle = not course.ahead and not course.failed and course.doubt_m <= 0.0
-            if not idle or drone in self._held or self._charge.get(drone, 0.0) < self._endurance.starts_at:
-                continue
+        ready = [drone for drone in self.control.drones if self._may_begin(drone)]
+        for i, drone in enumerate(ready):
             due = self.queue.open and now_ms >= self._next_try_ms.get(drone, 0)
-            if due and not self._give_tour(drone, now_ms):
+            most = math.ceil(len(self.queue.open) / (len(ready) - i)) if self._shares else MOST_OF_TOUR
+            if due and not self._give_tour(drone, now_ms, min(most, MOST_OF_TOUR)):
                 self._next_try_ms[drone] = now_ms + _RETRY_MS
 
-    def _give_tour(self, drone: str, now_ms: int) -> bool:
+    def _may_begin(self, drone: str) -> bool:
+        """Whether a drone has nothing to do, and a battery to do something."""
+        course = self.control.drones[drone]
+        idle = not course.ahead and not course.failed and course.doubt_m <= 0.0
+        return idle and drone not in self._held and self._charge.get(drone, 0.0) >= self._endurance.starts_at
+
+    def _give_tour(self, drone: str, now_ms: int, most: int) -> bool:
         course = self.control.drones[drone]
         left_ms = self._endurance.left_ms(self._charge[drone])
         budget_ms = int(left_ms / (_SLOWER * (1 + _SPARE_FRAC)))
         busy = {self.queue.work(node).aisle for node in self.queue.given}
-        nodes = self.queue.tour(self._times(course.place, course.ends[0]), budget_ms, busy, drone=drone)
+        nodes = self.queue.tour(self._times(course.place, course.ends[0]), budget_ms, busy, most, drone)
         while nodes:
             if not self.control.give(drone, [self._stop(node) for node in nodes], course.ends, now_ms):
                 self._refused(nodes)

@@ -9,6 +9,8 @@ from typing import Final
 
 _VALUE_SPAN_MS: Final = 3_600_000
 """A class of value outweighs the way to it up to so long."""
+MOST_OF_TOUR: Final = 40
+"""A drone is not given more nodes at a time."""
 
 
 class Value(IntEnum):
@@ -113,7 +115,7 @@ class WorkQueue:
         times: TourTimes,
         budget_ms: int,
         busy_aisles: Collection[str] = (),
-        most: int = 40,
+        most: int = MOST_OF_TOUR,
         drone: str = "",
     ) -> tuple[str, ...]:
         """The nodes of one tour of a drone within a budget: first the most valuable aisle that nobody flies

@@ -42,7 +42,7 @@ class StationTraffic:
         self._drones = drones
         self._control = TrafficControl(floor.lanes, pace, cell)
         self._queue = WorkQueue(())
-        self._dispatcher = Dispatcher(self._control, self._queue, _ENDURANCE)
+        self._dispatcher = Dispatcher(self._control, self._queue, _ENDURANCE, shares=True)
         self._dwell_ms = int(pace.dwell_s * 1000)
         self._flown: set[str] = set(drones)
         self._airs: dict[str, tuple[int, frozenset[int]]] = {}
