@@ -57,7 +57,7 @@ class FleetDrone:
         self._done = 0
         self._orders: BaseOrders | None = None
         self._refused = ""
-        self._paused = False
+        self._paused = self._astray = False
         self._called_off_s = -math.inf
         self._air: tuple[int, frozenset[int]] = (floor.pad(name), frozenset())
         self._levels = sorted({level for node in floor.nodes for level in node.levels})
@@ -97,7 +97,9 @@ class FleetDrone:
         if status.phase is not Phase.HOLD or not self.drone.vehicle.is_idle or status.position is None:
             return None
         node = self._floor.node_at((status.position.x_m, status.position.y_m))
-        return self._floor.lanes.over(node) if node == self.drone.vehicle.last_node and node else None
+        is_there = node is not None and node == self.drone.vehicle.last_node
+        # whose leg leads on to another node cannot be turned round
+        return self._floor.lanes.over(node) if node and is_there and status.way[:1] == (node,) else None
 
     def report(self) -> DroneReport:
         """What traffic is told."""
@@ -135,14 +137,14 @@ class FleetDrone:
         reached = step.sequence is not None and vehicle.last_sequence >= step.sequence
         return reached and (not step.count or vehicle.is_over(step.count))
 
-    @property
-    def lies_astray(self) -> bool:
-        """It has landed elsewhere than on its pad: only a person can say when it does not lie there any
-        more."""
-        status = self.drone.status
-        if status is None or status.phase not in OVER or status.position is None:
-            return False
-        return not self._floor.is_pad(self.name, (status.position.x_m, status.position.y_m))
+    def _note_astray(self, status: StatusReport) -> None:
+        """It has landed elsewhere than on its pad, and its daemon may be started anew there, believing to be
+        on the pad: it is a person's then, and lies where it is until he gives it back."""
+        at = status.position
+        if not self._astray and status.phase in OVER and at is not None:
+            self._astray = not self._floor.is_pad(self.name, (at.x_m, at.y_m))
+            if self._astray:
+                self.drone.taken_by_person()
 
     @property
     def air(self) -> tuple[int, frozenset[int]]:
@@ -152,34 +154,32 @@ class FleetDrone:
             return self._air
         at = None if status.position is None else (status.position.x_m, status.position.y_m)
         armed = status.vehicle is None or status.vehicle.armed
+        if self._astray and not armed:
+            return self._air
         if not armed and at is not None and self._floor.is_pad(self.name, at):
             self._air = pad, frozenset()
         elif at is not None and self.drone.is_heard:
             here = self._floor.nearest(at)
             ahead = (*self.drone.vehicle.ahead, *status.way) if armed else ()
             air = self._floor.way(self.name, (here, *ahead)) if armed else frozenset[int]()
-            self._air = self._floor.lanes.over(here), air | self._beside(at)
+            self._air = self._floor.lanes.over(here), air | self._floor.around(at)
         elif not self.drone.is_heard:
             here = self._floor.lanes.vertices[self._air[0]].node
             ordered = [self._node_of(step) for step in self._base]
             gone = self._floor.way(self.name, (here, *status.way, *ordered))
             self._air = self._air[0], self._air[1] | gone
+        self._note_astray(status)
         return self._air
 
     def _node_of(self, step: _Step) -> str:
         return self._floor.lanes.vertices[step.action.vertex].node
-
-    def _beside(self, at: tuple[float, float]) -> frozenset[int]:
-        """The lanes that a drone between two nodes may be on."""
-        near = self._floor.lanes.over(self._floor.nearest(at))
-        return frozenset(arc.resource for arc in self._floor.lanes.arcs[near])
 
     # what it is told
 
     def begin(self) -> None:
         """Traffic flies it from now on, from where it rests; nothing of before is left."""
         self._base.clear()
-        self._done, self._orders, self._refused = 0, None, ""
+        self._done, self._orders, self._refused, self._astray = 0, None, "", False
         self.drone.flies = self.drone.lands = False
         self.drone.has_more = True
         if self._paused:

@@ -17,7 +17,7 @@ import msgspec
 from flightd.adapters.ground_link.messages.floor import FloorPad, FloorStatus
 from flightd.core.errors import InputError
 from flightd.fleet.traffic.cells import CellSize
-from flightd.fleet.traffic.lanes import UPRIGHT, Lane, LaneGraph, Vertex
+from flightd.fleet.traffic.lanes import UPRIGHT, Box, Lane, LaneGraph, Vertex
 from flightd.ground.mqtt.linked_floor import node_of_pad, open_ways
 from flightd.site.ways import Ways
 
@@ -109,6 +109,17 @@ class FleetFloor:
         """The node that is nearest to a drone."""
         return self._nearest(at).node
 
+    def around(self, at: tuple[float, float]) -> frozenset[int]:
+        """The lanes on which a drone may be that is not over a node; all at its nearest node where it is on
+        none."""
+        if self.node_at(at) is not None:
+            return frozenset()
+        first, boxes = len(self.lanes.vertices), self.lanes.boxes
+        number = range(first, first + len(self.lanes.lanes))
+        near = frozenset(i for i in number if _apart_m(boxes[i], at) <= _NEAR_M)
+        over = self.lanes.over(self.nearest(at))
+        return near or frozenset(arc.resource for arc in self.lanes.arcs[over])
+
     def way(self, drone: str, nodes: Sequence[str]) -> frozenset[int]:
         """All the air of a way over these nodes and onto the drone's pad, by the shortest ways."""
         home = self.pads[drone].node
@@ -126,6 +137,11 @@ class FleetFloor:
     def _nearest(self, at: tuple[float, float]) -> Vertex:
         over = (vertex for vertex in self.lanes.vertices if vertex.pad is None)
         return min(over, key=lambda vertex: math.dist((vertex.x_m, vertex.y_m), at))
+
+
+def _apart_m(box: Box, at: tuple[float, float]) -> float:
+    x_m, y_m = at
+    return math.hypot(max(box.x0_m - x_m, x_m - box.x1_m, 0.0), max(box.y0_m - y_m, y_m - box.y1_m, 0.0))
 
 
 def _without_pads(floor: FloorStatus) -> FloorStatus:

@@ -85,8 +85,6 @@ class StationTraffic:
         if self._airs.get(name) != air:
             self._airs[name] = air
             self._dispatcher.withdraw(name, *air, now_ms)
-        if drone.lies_astray:
-            drone.drone.taken_by_person()
         drone.call_off(now_ms / 1000)
         rests_at = drone.rests_at
         if rests_at is not None and self._dispatcher.readmit(name, rests_at, self._floor.pad(name), now_ms):
