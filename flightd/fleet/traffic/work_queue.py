@@ -119,11 +119,13 @@ class WorkQueue:
         drone: str = "",
     ) -> tuple[str, ...]:
         """The nodes of one tour of a drone within a budget: first the most valuable aisle that nobody flies
-        in, from its nearer end on, then what lies nearest.  Empty where nothing fits."""
+        in, or that has work for this drone alone, from its nearer end on, then what lies nearest.  Empty
+        where nothing fits."""
         aisles: dict[str, list[NodeWork]] = {}
         for node in self._open:
             work = self._work[node]
-            if work.aisle not in busy_aisles and work.drone in {"", drone}:
+            named = bool(drone) and work.drone == drone
+            if named or (not work.drone and work.aisle not in busy_aisles):
                 aisles.setdefault(work.aisle, []).append(work)
         ranked = sorted(aisles.values(), key=lambda works: self._rank(works, times))
         nodes: list[str] = []
