@@ -74,7 +74,9 @@ class Fleet:
     async def until_told(self, key: str, holds: Callable[[Any], bool], within_s: float = 120.0) -> None:
         """The station tells it so of its fleet.  Fails where it does not in time."""
         async with asyncio.timeout(within_s):
-            while not holds((await self.state())[key]):
+            while True:
+                if holds((await self.state())[key]):
+                    return
                 await asyncio.sleep(30 * _LOOK_S)
 
     async def state(self) -> dict[str, Any]:
