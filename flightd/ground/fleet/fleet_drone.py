@@ -75,6 +75,22 @@ class FleetDrone:
             return False
         return status.phase not in FLYING or status.phase is Phase.RELOCATE or self._is_on_base(status)
 
+    @property
+    def why(self) -> str:
+        """Why traffic does not fly it, in words."""
+        status, floor = self.drone.status, self.drone.floor
+        if status is None or floor is None or not self.drone.is_heard:
+            return "it is not heard"
+        if not self._floor.is_of(floor):
+            return f"it flies by another map: {floor.name}"
+        if self._astray:
+            return "it landed beside its pad; give it back once it stands there again"
+        if self.drone.is_taken:
+            return "a person has it"
+        if not self.drone.is_automatic:
+            return f"it takes no orders now: {status.phase}, {status.reason}".removesuffix(", ")
+        return self._refused or "it is not where traffic could fly it on from"
+
     def _is_on_base(self, status: StatusReport) -> bool:
         vehicle, home = self.drone.vehicle, self._floor.pads[self.name].node
         return not status.way or status.way[0] in {vehicle.last_node, *vehicle.ahead, home}

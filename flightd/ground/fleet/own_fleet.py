@@ -29,6 +29,7 @@ TRAFFIC: Final = Identity("fleet traffic", Role.OPERATOR, "local")
 """Whose orders they are, in the audit."""
 _LOG = logging.getLogger(__name__)
 _STEP_S: Final = 0.25
+_AGAIN_S: Final = 5.0
 
 
 class OwnFleet:
@@ -68,10 +69,15 @@ class OwnFleet:
     async def _control(self) -> None:
         loop = asyncio.get_running_loop()
         while True:
-            if self._traffic is None:
-                self._assemble()
-            else:
-                self._traffic.step(int(loop.time() * 1000))
+            try:
+                if self._traffic is None:
+                    self._assemble()
+                else:
+                    self._traffic.step(int(loop.time() * 1000))
+            except Exception as err:  # noqa: BLE001 - the station goes on; nobody is released to more
+                _LOG.error("the traffic of the fleet failed, and begins anew", exc_info=True)
+                self._traffic, self._trouble = None, f"it failed: {err}"
+                await asyncio.sleep(_AGAIN_S)
             await asyncio.sleep(_STEP_S)
 
     def _assemble(self) -> None:

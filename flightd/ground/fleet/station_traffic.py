@@ -33,7 +33,7 @@ def pace_of(standings: Iterable[Standing]) -> Pace:
 
 
 class StationTraffic:
-    """`step` it often.  All drones stand on their pads at first."""
+    """`step` it often.  It takes the drones one by one, where each rests."""
 
     def __init__(
         self, floor: FleetFloor, drones: Mapping[str, FleetDrone], pace: Pace, cell: CellSize
@@ -44,7 +44,7 @@ class StationTraffic:
         self._queue = WorkQueue(())
         self._dispatcher = Dispatcher(self._control, self._queue, _ENDURANCE, shares=True)
         self._dwell_ms = int(pace.dwell_s * 1000)
-        self._flown: set[str] = set(drones)
+        self._flown: set[str] = set()
         self._airs: dict[str, tuple[int, frozenset[int]]] = {}
         for name in drones:
             self._control.enter(name, floor.pad(name))
@@ -102,6 +102,7 @@ class StationTraffic:
                     "at": lanes.vertices[course.place].node,
                     "base": [lanes.vertices[action.vertex].node for action in course.base],
                     "waits_for": list(self._control.waits(name)) if name in self._flown else [],
+                    "why": "" if name in self._flown else self._drones[name].why,
                 }
                 for name, course in self._control.drones.items()
             },

@@ -139,6 +139,11 @@ class ManagedDrone:
         return self._heard
 
     @property
+    def is_taken(self) -> bool:
+        """A person commands it."""
+        return self._taken
+
+    @property
     def status(self) -> StatusReport | None:
         """What it told last."""
         return self._status

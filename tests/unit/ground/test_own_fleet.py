@@ -13,6 +13,7 @@ from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.dispatcher import Dispatcher
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.fleet.fleet_floor import FleetFloor
 from flightd.ground.fleet.own_fleet import OwnFleet
@@ -119,6 +120,7 @@ def test_a_named_drone_visits_what_it_is_asked_for_round_the_one_that_a_person_t
         fleet.own.ask(["A2"], "c")
         await until(lambda: not fleet.flown("b"))
         assert fleet.pages["b", "manager"] == {"flies": False}
+        assert fleet.state["drones"]["b"]["why"] == "a person has it"
         await until(lambda: fleet.state["done"] == ["A2"], 200)
         await until(lambda: fleet.drones["c"].phase is Phase.DONE, 200)
         assert (b.phase, a.phase) == (Phase.HOLD, Phase.PREFLIGHT)
@@ -195,6 +197,23 @@ def test_what_another_station_commands_takes_a_drone_and_the_end_halts_the_other
     fleet = fly(go, "ab")
     assert fleet.drones["a"].paused
     assert not fleet.drones["b"].paused, "it is somebody else's"
+
+
+def test_where_traffic_fails_everybody_ends_his_base_and_is_brought_home_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        fleet.own.ask(["A3", "B3"])
+        await until(lambda: a.phase is Phase.HOVER and a.way[0] == "A2", 100)
+        with monkeypatch.context() as patched:
+            patched.setattr(Dispatcher, "step", lambda *_: 1 / 0)
+            await until(lambda: not fleet.state["flies"])
+            assert fleet.state["trouble"] == "it failed: division by zero"
+            await until(lambda: a.phase is Phase.HOLD and b.phase is Phase.HOLD)
+        await until(lambda: a.phase is Phase.DONE and b.phase is Phase.DONE, 300)
+
+    fly(go, "ab")
 
 
 def test_a_drone_with_little_left_is_sent_nowhere() -> None:
