@@ -3,13 +3,19 @@ links."""
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import pytest
 
+from flightd.adapters.ground_link.client import Address
 from flightd.core.types import Phase
-from tests.rigs.event_loops import real
+from flightd.ground.access.audit import newest_entries
+from tests.rigs.event_loops import in_real_time, real
 from tests.rigs.waiting import until
 from tests.web.live_flight import LiveFlight
 from tests.web.own_fleet_rig import flown, waiting
+from tests.web.served import JSON, served
 
 _SPEED = 5.0
 
@@ -43,3 +49,39 @@ def test_a_drone_visits_its_nodes_round_one_that_a_person_took_and_one_that_fell
         real(go(flights))
     flown_by = {drone for what, drone, outcome, _ in written if (what, outcome) == ("start", "accepted")}
     assert flown_by == {"a", "b", "c"}
+
+
+@pytest.mark.realtime(cores=0.5)
+def test_the_end_of_the_station_leaves_a_drone_that_holds() -> None:
+    async def go(flights: dict[str, LiveFlight]) -> None:
+        (drone,) = flights.values()
+        async with flown(flights, _SPEED, []) as fleet:
+            await fleet.until_told("flies", lambda flies: flies)
+            assert (await fleet.ask("POST", "/api/fleet/tour", {"nodes": ["A3"]})) == (200, {})
+            await until(lambda: drone.phase is Phase.FOLLOW and drone.at_m[0] > 0.3, 90)
+        await until(lambda: drone.phase is Phase.HOLD, 60)
+
+    with waiting("a") as flights:
+        real(go(flights))
+
+
+@in_real_time
+async def test_without_a_fleet_nothing_is_flown_and_stop_is_there_for_all(tmp_path: Path) -> None:
+    nobody = ("north", Address("127.0.0.1", 1, 2))
+    async with served(nobody, state=tmp_path) as station:
+        own = {"Origin": station.origin, **JSON}
+        none = "the station flies no fleet; start it with --fleet"
+        assert await station.ask("GET", "/api/fleet") == (
+            404,
+            json.dumps({"refused": none}, separators=(",", ":")),
+        )
+        body = json.dumps({"nodes": ["A1"]}).encode()
+        assert none in (await station.ask("POST", "/api/fleet/tour", own, body))[1]
+        code, said = await station.ask("POST", "/api/fleet/tour", own, b'{"nodes": []}')
+        assert (code, "not a tour" in said) == (400, True)
+        code, said = await station.ask("POST", "/api/fleet/stop", own)
+        assert (code, "north cannot be reached" in json.loads(said)["refused"]["north"]) == (200, True)
+    lines = newest_entries(tmp_path, 9)
+    assert [(line["act"], line["target"], line["outcome"]) for line in lines if line["act"] == "stop"] == [
+        ("stop", "north", "refused")
+    ]
