@@ -25,7 +25,7 @@ from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.ground.messages import Act, LinkState
 from flightd.sim.fleet.world import FleetDrone
 from flightd.site.layout import lay_out
-from flightd.site.site import Aisle, Pad, Site
+from flightd.site.site import Aisle, Pad, Rack, Site
 
 PADS = {"a": "A1", "b": "B1", "c": "B5"}
 STEP_S = 0.1
@@ -39,6 +39,7 @@ _IN_AIR = (
     CommandKind.LAND,
     CommandKind.STOP,
 )
+_COUNTS_S = 6.0
 _LASTS_S = {Phase.TAKE_OFF: 3.0, Phase.HOVER: 1.0, Phase.LAND: 3.0}
 
 
@@ -48,8 +49,12 @@ def hall(drone: str, name: str = "hall") -> Site:
         Pad("home" if each == drone else f"pad-{each}", node, 0.5, charge=each == drone)
         for each, node in PADS.items()
     ]
-    aisles = [Aisle(aisle, 0.0, y_m, _STEPS_M) for aisle, y_m in (("A", 0.0), ("B", 3.0))]
-    return lay_out(name, aisles, [("A2", "B2"), ("A4", "B4")], pads, ceiling_m=6.0)
+    aisles = [
+        Aisle(aisle, 0.0, y_m, _STEPS_M, shelf_distance_m=1.2, shelf_height_m=2.5)
+        for aisle, y_m in (("A", 0.0), ("B", 3.0))
+    ]
+    racks = [Rack(("A", "B"), 1.6, (0.3, 1.5), positions=1)]
+    return lay_out(name, aisles, [("A2", "B2"), ("A4", "B4")], pads, ceiling_m=6.0, racks=racks)
 
 
 class PaperDrone:
@@ -61,6 +66,7 @@ class PaperDrone:
         self._tell = tell
         self.on_person: Callable[[], None] = lambda: None
         self.heard = True
+        self.counts = False
         self.plan = ""
         self._nodes: tuple[str, ...] = ()
         self._session = 0
@@ -119,9 +125,12 @@ class PaperDrone:
             self._event("command", "plan")
         way = (self.site.home.node, *nodes, self.site.home.node)
         return Planned(
-            version=1, request=order_id, nodes=tuple(nodes), levels=tuple(levels), way=way, places=0,
-            way_m=40.0, seconds=80.0, batteries=1, charge=1.0, battery_s=900.0,
+            version=1, request=order_id, nodes=tuple(nodes), levels=tuple(levels), way=way,
+            places=4 * self.counts, way_m=40.0, seconds=80.0, batteries=1, charge=1.0, battery_s=900.0,
         )  # fmt: skip
+
+    async def inventory(self) -> tuple[dict[str, str], ...]:
+        return ()
 
     # the drone
 
@@ -142,7 +151,8 @@ class PaperDrone:
 
     def _fly(self) -> None:
         self._timer_s += STEP_S
-        if self.phase in _LASTS_S and self._timer_s < _LASTS_S[self.phase] and not self._holds:
+        lasts_s = _COUNTS_S if self.counts and self.phase is Phase.HOVER else _LASTS_S.get(self.phase, 0.0)
+        if self._timer_s < lasts_s and not self._holds:
             return
         match self.phase:
             case Phase.TAKE_OFF:

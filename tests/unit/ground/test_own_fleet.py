@@ -85,9 +85,13 @@ class PaperFleet:
             await asyncio.wait(tasks)
 
 
-def fly(go: Callable[[PaperFleet], Coroutine[Any, Any, None]], names: str = "abc") -> PaperFleet:
+def fly(
+    go: Callable[[PaperFleet], Coroutine[Any, Any, None]], names: str = "abc", *, counts: bool = False
+) -> PaperFleet:
     """Do `go` while the fleet flies."""
     fleet = PaperFleet({name: hall(name) for name in names})
+    for drone in fleet.drones.values():
+        drone.counts = counts
 
     async def whole() -> None:
         async with fleet.flying():
@@ -214,6 +218,20 @@ def test_where_traffic_fails_everybody_ends_his_base_and_is_brought_home_anew(
         await until(lambda: a.phase is Phase.DONE and b.phase is Phase.DONE, 300)
 
     fly(go, "ab")
+
+
+def test_a_drone_that_counts_is_not_sent_on_before_its_count_is_over() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a = fleet.drones["a"]
+        fleet.own.ask(["A2", "A3"])
+        await until(lambda: a.phase is Phase.HOVER and a.way[0] == "A2", 100)
+        await asyncio.sleep(4.0)
+        assert (fleet.state["done"], a.phase) == ([], Phase.HOVER)
+        await until(lambda: fleet.state["done"] == ["A2"], 10)
+        await until(lambda: a.phase is Phase.DONE, 300)
+        assert fleet.state["done"] == ["A2", "A3"]
+
+    fly(go, "a", counts=True)
 
 
 def test_a_drone_with_little_left_is_sent_nowhere() -> None:
