@@ -66,7 +66,7 @@ class PaperDrone:
         self._tell = tell
         self.on_person: Callable[[], None] = lambda: None
         self.heard = True
-        self.counts = False
+        self.counts = self.never_starts = False
         self.plan = ""
         self._nodes: tuple[str, ...] = ()
         self._session = 0
@@ -97,7 +97,8 @@ class PaperDrone:
     async def act(self, act: Act, *, by_person: bool = True) -> Accepted:
         if by_person:
             self.on_person()
-        if act.command not in self._possible:
+        stays = self.never_starts and act.command is CommandKind.START
+        if stays or act.command not in self._possible:
             raise RunError(f"{act.command} refused: not in phase {self.phase}")
         self.commands.append(f"{act.command} {act.node}".strip())
         self._event("command", self.commands[-1])

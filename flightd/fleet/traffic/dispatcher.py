@@ -125,7 +125,9 @@ class Dispatcher:
         self._held.discard(drone)
         self._avoided.discard(drone)
         self._waits_since_ms.pop(drone, None)
-        self.queue.hand_back(self._tours.pop(drone, set()))
+        if lost := self._tours.pop(drone, set()):
+            self._next_try_ms[drone] = now_ms + _RETRY_MS  # others first
+            self.queue.hand_back(lost)
         self._settle_tours()
         self._free(before - self._near(drone))
 

@@ -32,6 +32,7 @@ _DOUBTS_M: Final = 3.0
 """By how much a drone may be off that looks for its place: a node beside the one that it was at."""
 _SIGMAS: Final = 3.0
 _CALLED_OFF_EVERY_S: Final = 2.0
+_STARTS_WITHIN_S: Final = 60.0
 _CLIMBS: Final = frozenset({Phase.TAKE_OFF, Phase.ACQUIRE})
 
 
@@ -59,6 +60,7 @@ class FleetDrone:
         self._refused = ""
         self._paused = self._astray = False
         self._called_off_s = -math.inf
+        self._stands_since_s = 0.0
         self._air: tuple[int, frozenset[int]] = (floor.pad(name), frozenset())
         self._levels = sorted({level for node in floor.nodes for level in node.levels})
         self._sides = {(rack.aisle, rack.side) for rack in floor.racks}
@@ -212,8 +214,12 @@ class FleetDrone:
             if not self.drone.vehicle.is_idle:
                 self.drone.hear(instant("cancelOrder"))
 
-    def fly(self, released: Sequence[Action], *, paused: bool) -> None:
+    def fly(self, released: Sequence[Action], now_s: float, *, paused: bool) -> None:
         """Fly on so far; stand where it is while `paused`."""
+        if not self._base or not self.waits:
+            self._stands_since_s = now_s
+        elif now_s - self._stands_since_s >= _STARTS_WITHIN_S:
+            self._refused = "it does not start"
         self._base.extend(_Step(action) for action in released)
         if paused is not self._paused:
             self._pause(paused=paused)

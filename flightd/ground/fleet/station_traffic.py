@@ -77,7 +77,7 @@ class StationTraffic:
         doubting = {report.drone for report in reports if report.doubt_m > 0.0}
         for name in self._flown:
             paused = name in commands.paused - doubting  # who looks for his place stands by himself
-            self._drones[name].fly(commands.base.get(name, ()), paused=paused)
+            self._drones[name].fly(commands.base.get(name, ()), now_ms / 1000, paused=paused)
 
     def _lead_back(self, name: str, drone: FleetDrone, now_ms: int) -> None:
         """Keep others out of a drone's air until it rests, and then fly it again."""

@@ -234,6 +234,17 @@ def test_a_drone_that_counts_is_not_sent_on_before_its_count_is_over() -> None:
     fly(go, "a", counts=True)
 
 
+def test_what_a_drone_has_that_does_not_start_is_given_to_another_one() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        fleet.drones["a"].never_starts = True
+        fleet.own.ask(["A2"])
+        await until(lambda: fleet.state["given"] == {"A2": "a"})
+        await until(lambda: fleet.state["done"] == ["A2"], 200)
+        assert (fleet.drones["a"].phase, fleet.drones["b"].flies) == (Phase.PREFLIGHT, True)
+
+    fly(go, "ab")
+
+
 def test_a_drone_with_little_left_is_sent_nowhere() -> None:
     async def go(fleet: PaperFleet) -> None:
         fleet.drones["a"].left_s = 30.0
