@@ -62,16 +62,19 @@ class TrafficControl:
                 return False
         return True
 
-    def roam(self, drone: str, place: int, air: Collection[int], now_ms: int) -> tuple[str, ...]:
-        """A drone flies by somebody else's will, is near `place` and may be anywhere in `air`: others are
-        planned round that, and who was released into it stands still, until the drone enters anew.  Returns
+    def roam(
+        self, drone: str, place: int, air: Collection[int], doubt_m: float, now_ms: int
+    ) -> tuple[str, ...]:
+        """A drone flies by somebody else's will, is near `place` and may be anywhere in `air`, or `doubt_m`
+        beside: others are planned round that, and who was released into it stands still, until the drone enters anew.  Returns
         those for which there is no way."""
         course = self.drones[drone]
         projected = self.projected(now_ms)
         before = self.avoided(drone) if course.roams else frozenset()
         course.place, course.wreck, course.roams = place, frozenset((place, *air)), True
         course.ahead, course.stops, course.doubt_m, course.released = [], (), 0.0, course.done
-        zone = within(self.lanes, tuple(course.wreck), self._cell.separation_m, self._cell.upright_m)
+        reach_m = self._cell.separation_m + doubt_m
+        zone = within(self.lanes, tuple(course.wreck), reach_m, self._cell.upright_m)
         self._avoided[drone] = zone
         if zone <= before:
             return ()
