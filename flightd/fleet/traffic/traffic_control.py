@@ -62,6 +62,17 @@ class TrafficControl:
                 return False
         return True
 
+    def is_clear(self, drone: str, air: Iterable[int]) -> bool:
+        """Whether nobody else may be in this air now, or was released into it."""
+        wanted = frozenset(air)
+        near = wanted.union(*(self.conflicts[resource] for resource in wanted))
+        zones = self._zones()
+        return all(
+            near.isdisjoint(course.wreck or course.air) and wanted.isdisjoint(zones.get(other, ()))
+            for other, course in self.drones.items()
+            if other != drone
+        )
+
     def roam(
         self, drone: str, place: int, air: Collection[int], doubt_m: float, now_ms: int
     ) -> tuple[str, ...]:

@@ -185,6 +185,13 @@ class FleetDrone:
         base = [self._node_of(step) for step in self._base]
         self.air.close([(vehicle.last_node, *vehicle.ahead), told, base], self._doubt_m(status))
 
+    @property
+    def way_home(self) -> frozenset[int]:
+        """The air of the way that it would fly home from where it holds."""
+        status = self.drone.status
+        here = () if status is None else status.way[:1]
+        return self._floor.way(self.name, here)
+
     def _node_of(self, step: _Step) -> str:
         return self._floor.lanes.vertices[step.action.vertex].node
 

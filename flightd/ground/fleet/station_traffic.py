@@ -88,6 +88,7 @@ class StationTraffic:
             self._airs[name] = air
             self._dispatcher.withdraw(name, *air, now_ms)
         drone.call_off(now_ms / 1000)
+        drone.drone.may_go_home = self._control.is_clear(name, drone.way_home)
         rests_at = drone.rests_at
         if rests_at is not None and self._dispatcher.readmit(name, rests_at, self._floor.pad(name), now_ms):
             del self._airs[name]
