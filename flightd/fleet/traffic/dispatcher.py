@@ -118,8 +118,9 @@ class Dispatcher:
         self.queue.retry(nodes)
 
     def withdraw(self, drone: str, place: int, air: Collection[int], doubt_m: float, now_ms: int) -> None:
-        """A drone is flown by somebody else, near `place` and anywhere in `air`, or so far beside: what it had to count is
-        given to others, who fly round it (`TrafficControl.roam`).  Again whenever its air has changed."""
+        """A drone is flown by somebody else, near `place` and anywhere in `air`, or so far beside:
+        what it had to count is given to others, who fly round it (`TrafficControl.roam`).  Again whenever its
+        air has changed."""
         before = self._near(drone)
         self._held |= set(self.control.roam(drone, place, air, doubt_m, now_ms))
         self._held.discard(drone)

@@ -77,8 +77,8 @@ class TrafficControl:
         self, drone: str, place: int, air: Collection[int], doubt_m: float, now_ms: int
     ) -> tuple[str, ...]:
         """A drone flies by somebody else's will, is near `place` and may be anywhere in `air`, or `doubt_m`
-        beside: others are planned round that, and who was released into it stands still, until the drone enters anew.  Returns
-        those for which there is no way."""
+        beside: others are planned round that, and who was released into it stands still, until the drone
+        enters anew.  Returns those for which there is no way."""
         course = self.drones[drone]
         projected = self.projected(now_ms)
         before = self.avoided(drone) if course.roams else frozenset()

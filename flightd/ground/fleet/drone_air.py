@@ -1,7 +1,7 @@
 """Where a drone may be while traffic does not fly it.
 
-That only ever grows: what such a drone tells is no proof that it left any air for good.  It ends when the drone
-rests on its own pad at the end of a flight, when a person gives it back, or when traffic flies it on.
+That only ever grows: what such a drone tells is no proof that it left any air for good.  It ends when the
+drone rests on its own pad at the end of a flight, when a person gives it back, or when traffic flies it on.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ FLIGHT_S: Final = 3600.0
 _FULL_S: Final = 600.0
 """Of a drone that tells no charge: its own rules bring it home."""
 _DOUBTS_M: Final = 3.0
-"""By how much a drone may be off that looks for its place, or tells none: a node beside the one that it was at."""
+"""By how much a drone may be off that looks for its place, or tells none: a node beside its own."""
 _SIGMAS: Final = 3.0
 _CALLED_OFF_EVERY_S: Final = 2.0
 _STARTS_WITHIN_S: Final = 60.0
@@ -49,8 +49,8 @@ class _Step:
 
 
 class FleetDrone:
-    """`look` at it first.  `is_ours` says whether traffic may fly it, `air` where it may be while traffic does
-    not."""
+    """`look` at it first.  `is_ours` says whether traffic may fly it, `air` where it may be while traffic
+    does not."""
 
     def __init__(self, name: str, drone: ManagedDrone, floor: FleetFloor, uncertainty_m: float) -> None:
         self.name = name
@@ -92,10 +92,8 @@ class FleetDrone:
             return f"it flies by another map: {floor.name}"
         if self.air.is_astray:
             return "nothing shows that it stands on its pad; give it back once it does"
-        if self.drone.is_taken:
-            return "a person has it"
-        if self.air.is_believed is False:
-            return "it was started anew in flight"
+        if self.drone.is_taken or self.air.is_believed is False:
+            return "a person has it" if self.drone.is_taken else "it was started anew in flight"
         if not self.drone.is_automatic:
             return f"it takes no orders now: {status.phase}, {status.reason}".removesuffix(", ")
         return self._refused or "it is not where traffic could fly it on from"

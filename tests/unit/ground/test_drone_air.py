@@ -70,7 +70,8 @@ def test_only_the_end_of_a_flight_that_was_seen_over_its_pad_proves_that_it_rest
 def test_air_grows_from_where_it_was_seen_last_and_over_all_that_it_was_released_to() -> None:
     air = seen(told(Phase.FOLLOW, "B2", off_m=0.8))
     lane = FLOOR.around((0.8 + FLOOR.lanes.vertices[B2].x_m, FLOOR.lanes.vertices[B2].y_m))
-    assert lane and lane <= air.closed, "the lane in hand"
+    assert lane
+    assert lane <= air.closed, "the lane in hand"
     air.see(told(Phase.FOLLOW), stood=True, ordered=True)
     air.close([["A3"]], 3.0)
     assert {A3, B2, PAD} | lane <= air.closed

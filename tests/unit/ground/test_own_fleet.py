@@ -262,17 +262,63 @@ def test_no_drone_is_sent_home_through_the_air_of_another_one() -> None:
         fleet.own.hand_over("b", to_manager=True)
         await asyncio.sleep(60.0)
         assert (b.phase, b.commands[-1]) == (Phase.HOLD, "pause")
+        a.begin_anew()
+        await until(lambda: fleet.pages["a", "manager"] == {"flies": False})
+        fleet.own.hand_over("a", to_manager=True)
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert b.commands[-1] == "home"
 
     fly(go, "ab")
 
 
+def test_who_makes_for_home_by_himself_is_flown_by_somebody_else() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B4"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        b.way = ["B1", "B1"]
+        await until(lambda: not fleet.flown("b"), 5)
+
+    fly(go, "b")
+
+
+def test_the_end_halts_who_flies_while_traffic_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a = fleet.drones["a"]
+        fleet.own.ask(["A3"])
+        await until(lambda: a.phase is Phase.FOLLOW and a.way[0] == "A2", 100)
+        monkeypatch.setattr(Dispatcher, "step", lambda *_: 1 / 0)
+        await until(lambda: not fleet.state["flies"])
+        assert not a.paused
+
+    assert fly(go, "a").drones["a"].paused
+
+
+def test_where_traffic_fails_what_it_knows_of_a_drone_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.HOVER and b.way[0] == "B3", 100)
+        b.come_down()
+        await until(lambda: b.phase is Phase.ABORTED)
+        b.begin_anew(on_pad=False)
+        with monkeypatch.context() as patched:
+            patched.setattr(Dispatcher, "step", lambda *_: 1 / 0)
+            await until(lambda: not fleet.state["flies"])
+        a.heard = False
+        await until(lambda: fleet.state["flies"])
+        fleet.own.ask(["B3"], "c")
+        await asyncio.sleep(60.0)
+        assert fleet.state["done"] == []
+
+    fly(go)
+
+
 def test_an_error_about_one_drone_ends_no_other_one(monkeypatch: pytest.MonkeyPatch) -> None:
     async def go(fleet: PaperFleet) -> None:
-        step = ManagedDrone._step
         with monkeypatch.context() as patched:
             patched.setattr(ManagedDrone, "_step", lambda *_: 1 / 0)
             await asyncio.sleep(1.0)
-            patched.setattr(ManagedDrone, "_step", step)
         await until(lambda: fleet.flown("a") and fleet.flown("b"))
         fleet.own.ask(["A2"], "a")
         await until(lambda: fleet.state["done"] == ["A2"], 200)
