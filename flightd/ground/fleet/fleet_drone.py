@@ -202,7 +202,8 @@ class FleetDrone:
         self.air.begin()
         self.drone.flies = self.drone.lands = False
         self.drone.has_more = True
-        self._pause(paused=False)  # whoever paused it
+        if self._paused:
+            self._pause(paused=False)
 
     def call_off(self, now_s: float) -> None:
         """Traffic does not fly it any more: what it was ordered ends at the next node."""

@@ -247,6 +247,22 @@ def test_a_pause_between_two_nodes_leaves_a_drone_to_traffic(monkeypatch: pytest
     fly(go, "b")
 
 
+def test_who_was_paused_as_traffic_failed_is_flown_on_by_the_new_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.HOVER and b.way[0] == "B2", 100)
+        with monkeypatch.context() as patched:
+            patched.setattr(TrafficControl, "paused", lambda _: frozenset({"b"}))
+            await until(lambda: b.phase is Phase.HOLD)
+            patched.setattr(Dispatcher, "step", lambda *_: 1 / 0)
+            await until(lambda: not fleet.state["flies"])
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert "home" not in b.commands
+
+    fly(go, "b")
+
+
 def test_no_drone_is_sent_home_through_the_air_of_another_one() -> None:
     async def go(fleet: PaperFleet) -> None:
         a, b = fleet.drones["a"], fleet.drones["b"]
