@@ -85,6 +85,7 @@ STAYS_ENGLISH = {
     "flightd ground --folder out": "a command to type",
     "SELECT data FROM expected_stock WHERE store = ?": "a question to the book",
     "interlock = true": "a line of a site file",
+    "unattended_start = true": "a line of a site file",
     "manual_exposure = true": "a line of the configuration",
     "{} ({} cameras take it)": "the end of a refusal, which has its German as a whole",
     "{}, and leave the key out": "the middle of that",

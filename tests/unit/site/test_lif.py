@@ -107,7 +107,8 @@ def sites(draw: st.DrawFn) -> Site:
     offset = draw(st.sampled_from([[0.0, 0.0], [0.25, -0.3]]))
     tables: dict[str, Any] = {
         "site": {"name": "hall", **draw(st.sampled_from([{}, {"ceiling_m": 6.0}])),
-                 "line_width_m": draw(st.sampled_from([0.075, 0.06])), "interlock": draw(st.booleans())},
+                 "line_width_m": draw(st.sampled_from([0.075, 0.06])), "interlock": draw(st.booleans()),
+                 "unattended_start": draw(st.booleans())},
         "aisle": aisles,
         "cross": crosses,
         "rack": [rack] if shelved and racked else [],
