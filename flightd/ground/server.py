@@ -27,11 +27,14 @@ from flightd.ground.ground_store.webhooks import Webhook
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.missions.mission_book import MissionBook
 from flightd.ground.page_person import PagePeople
 from flightd.ground.page_socket import PageSocket
 from flightd.ground.quiet_log import quiet_log
 from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.schedules.night_shift import THIS_MACHINE, NightShift, StationClock
+from flightd.ground.schedules.schedule_book import ScheduleBook
 from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.studio.studio import Studio
 from flightd.ground.tls import Certificate
@@ -192,11 +195,12 @@ async def serve(
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
     hooks: Sequence[Webhook] = (),
+    clock: StationClock = THIS_MACHINE,
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
     end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are;
     `fleet` has the drones flown by somebody else's manager; `store` is fed with what lies there, asked by
-    programs, and `hooks` are told of it."""
+    programs, and `hooks` are told of it; the schedules kept in `folder` go by the `clock`."""
     viewers = viewers if fleet is None else (*viewers, fleet)
     hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
@@ -222,6 +226,7 @@ async def serve(
                 others,
                 fleet,
                 store,
+                clock,
             ),
             http="h11",
             ws=PageSocket,
@@ -244,6 +249,10 @@ async def serve(
         station = tasks.create_task(hub.run(), name="hub")
         tasks.create_task(flights.run(), name="flights")
         managed = [] if fleet is None else [tasks.create_task(fleet.run(hub), name="fleet")]
+        if folder is not None:
+            book, missions = ScheduleBook(folder), MissionBook(folder)
+            shift = NightShift(book, missions, store, hub.drones, access, fleet, clock)
+            tasks.create_task(shift.run(), name="schedules")
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")
         if simulated is not None:

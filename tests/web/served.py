@@ -21,6 +21,7 @@ from flightd.ground.access.access import Access
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.hub import Viewer
 from flightd.ground.mqtt.fleet_link import FleetLink
+from flightd.ground.schedules.night_shift import THIS_MACHINE, StationClock
 from flightd.ground.server import Listening, opened, serve
 
 JSON = {"Content-Type": "application/json"}
@@ -107,9 +108,10 @@ async def served(
     send_buffer: int | None = None,
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
+    clock: StationClock = THIS_MACHINE,
 ) -> AsyncIterator[Station]:
     """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`; its system
-    takes so many bytes at once for a page (None: as many as it likes)."""
+    takes so many bytes at once for a page (None: as many as it likes).  Schedules go by the `clock`."""
     listener, where = opened(Listening("127.0.0.1", 0))
     if send_buffer is not None:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, send_buffer)
@@ -127,6 +129,7 @@ async def served(
                 viewers=viewers,
                 fleet=fleet,
                 store=store,
+                clock=clock,
             )
         )
         try:

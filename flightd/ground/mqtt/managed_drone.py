@@ -130,6 +130,11 @@ class ManagedDrone:
         """The station hears the drone."""
         return self._heard
 
+    @property
+    def is_taken(self) -> bool:
+        """A person commands the drone."""
+        return self._taken
+
     def tell(self, topic: str, value: Any) -> None:
         """What the hub says of the drone."""
         match topic:
