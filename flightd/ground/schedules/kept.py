@@ -27,7 +27,7 @@ class CountMission(msgspec.Struct, frozen=True, tag="mission", tag_field="kind",
 
 
 class CountAisles(msgspec.Struct, frozen=True, tag="aisles", tag_field="kind", forbid_unknown_fields=True):
-    """All nodes of some aisles that face a shelf, and of their shelves these levels (none: all)."""
+    """All nodes of some aisles that face a place, and of their shelves these levels (none: all)."""
 
     aisles: Annotated[tuple[_Aisle, ...], Meta(min_length=1, max_length=MOST_NODES)]
     levels: _Levels = ()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from flightd.adapters.ground_link.messages.floor import FloorStatus
+from flightd.adapters.ground_link.messages.floor import FloorNode, FloorStatus
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
 from flightd.core.planned_flight import MOST_NODES
@@ -50,19 +50,22 @@ def work_of(
     following = [one.at for one in schedule.rule.next_occurrences(now, _MOST_RUNS)]
     known = _counts(floor, list(_stock(store, schedule.kept.site)))
     nodes = run_nodes(known, now, timedelta(days=count.within_days), following)
-    if not nodes:
-        raise InputError("no node of this site faces a shelf")
     return Work(nodes[:MOST_NODES])
 
 
 def _aisle_nodes(floor: FloorStatus, aisles: Sequence[str]) -> tuple[str, ...]:
     found: list[str] = []
     for aisle in dict.fromkeys(aisles):
-        nodes = [node.id for node in floor.nodes if node.aisle == aisle and node.levels]
+        nodes = [node.id for node in _shelved(floor) if node.aisle == aisle]
         if not nodes:
-            raise InputError(f"aisle {aisle} has no node that faces a shelf")
+            raise InputError(f"aisle {aisle} has no node at which something is counted")
         found += nodes
     return tuple(found)
+
+
+def _shelved(floor: FloorStatus) -> Sequence[FloorNode]:
+    """The nodes that face a place; all, where the site knows no places."""
+    return [node for node in floor.nodes if node.levels] or floor.nodes
 
 
 def _stock(store: GroundStore, site: str) -> Iterator[dict[str, Any]]:
@@ -78,7 +81,7 @@ def _stock(store: GroundStore, site: str) -> Iterator[dict[str, Any]]:
 
 
 def _counts(floor: FloorStatus, stock: Sequence[dict[str, Any]]) -> list[NodeCount]:
-    """The nodes that face shelves, aisle by aisle as on the floor, with the worst that is known of each."""
+    """The nodes to be counted, aisle by aisle as on the floor, with the worst that is known of each."""
     oldest: dict[str, datetime | None] = {}
     exceptions = set()
     for place in stock:
