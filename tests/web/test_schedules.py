@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any
 from flightd.adapters.ground_link.client import Address
 from flightd.config.schema import load_config
 from flightd.ground.access.roles import Role
+from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.schedules.night_shift import StationClock
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import in_real_time
@@ -37,14 +38,64 @@ class Clock:
     """The time of day at the station, as a test sets it."""
 
     def __init__(self, at: str) -> None:
+        self._was_read = asyncio.Event()
         self.set(at)
 
     def set(self, at: str) -> None:
         self.now = datetime.fromisoformat(at).replace(tzinfo=UTC)
 
+        self.reads = 0
+
     @property
     def station(self) -> StationClock:
-        return StationClock(lambda: int(self.now.timestamp()) * 10**9, step_s=0.02)
+        return StationClock(self._read, step_s=0.02)
+
+    def _read(self) -> int:
+        self.reads += 1
+        self._was_read.set()
+        return int(self.now.timestamp()) * 10**9
+
+    async def looked_at(self) -> None:
+        """The station has looked at its schedules by this time."""
+        enough = self.reads + 4
+        while self.reads < enough:
+            self._was_read.clear()
+            await self._was_read.wait()
+
+
+class Viewer:
+    """What is told to who looks on without attending."""
+
+    def __init__(self) -> None:
+        self.told: dict[str, Any] = {}
+        self._told_more = asyncio.Event()
+
+    def attach(self, wake: Callable[[], object] | None) -> None:
+        pass
+
+    def tell(self, drone: str, topic: str, value: Any) -> None:
+        del drone
+        self.told[topic] = value
+        self._told_more.set()
+
+    def show(self, key: PictureKey, picture: LinkPicture) -> None:
+        pass
+
+    def has_use_for(self, key: PictureKey) -> bool:
+        del key
+        return False
+
+    async def until(self, seen: Callable[[dict[str, Any]], bool]) -> None:
+        """Until it is told so."""
+        async with asyncio.timeout(60):
+            while not seen(self.told):
+                self._told_more.clear()
+                await self._told_more.wait()
+
+    @property
+    def starts(self) -> int:
+        """Starts that the drone took."""
+        return sum(one.name == "command" and one.text.startswith("start") for one in self.told["events"])
 
 
 async def ask(
@@ -119,25 +170,32 @@ async def test_a_run_that_is_due_starts_one_flight_however_the_clock_jumps_and_t
     tmp_path: Path,
 ) -> None:
     clock, state = Clock("2026-10-20T12:00"), tmp_path / "state"
-    with LiveFlight(SITE, CONFIG, lost_action="land", lost_s=5.0) as flight:
+    with LiveFlight(SITE, CONFIG) as flight:
         status, command = flight.ports
-        address = Address("127.0.0.1", status, command)
-        async with served(("demo", address), folder=tmp_path, state=state, clock=clock.station) as station:
+        drone, viewer = ("demo", Address("127.0.0.1", status, command)), Viewer()
+        flight.pace(6.0)
+        async with served(
+            drone, folder=tmp_path, state=state, viewers=[viewer], clock=clock.station
+        ) as station:
             await ask(station, "PUT", "/schedule-1", **TUESDAYS)
+            await viewer.until(lambda told: "status" in told)
+            assert not viewer.told["link"].attends
             clock.set("2026-10-20T20:00")
             run = await run_is(station, "started")
             assert run["nodes"][0].startswith("A")
-            flight.pace(8.0)
+            await viewer.until(lambda told: told["status"].phase == "follow" and told["link"].attends)
             for jumped in ("2026-10-20T19:30", "2026-10-20T20:10", "2026-10-22T20:00", "2026-10-20T20:05"):
                 clock.set(jumped)
-                await asyncio.sleep(0.1)
-        async with (
-            served(("demo", address), folder=tmp_path, state=state, clock=clock.station) as station,
-            station.page() as page,
-        ):  # the station attends, and so goes on though pages come and go
-            del page
+                await clock.looked_at()
+        again = Viewer()
+        async with served(
+            drone, folder=tmp_path, state=state, viewers=[again], clock=clock.station
+        ) as station:
+            await again.until(lambda told: "link" in told and told["link"].attends)
+            await clock.looked_at()
             _, told = await ask(station, "GET", "/schedule-1/runs")
             assert [(one["day"], one["state"]) for one in told["runs"]] == [("2026-10-20", "started")]
+            assert (again.starts, again.told["status"].plan) == (1, run["plan"])
         starts = [line for line in audited(state) if line["person"] == "schedule Aisle A"]
         assert [(line["outcome"], line["by"], line["id"]) for line in starts] == [
             ("accepted", "schedule", run["plan"])

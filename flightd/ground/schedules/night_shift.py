@@ -22,7 +22,6 @@ from flightd.core.errors import FlightdError, InputError, RunError
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.schedule.due import LOOK_BACK, decide
 from flightd.fleet.schedule.rule import MOST_WINDOW, Occurrence
-from flightd.ground.access.access import Access
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.bounded import Threads
 from flightd.ground.ground_store.store import GroundStore
@@ -37,8 +36,6 @@ from flightd.ground.schedules.work import Work, work_of
 _LOG = logging.getLogger(__name__)
 _AT_ONCE, _MOST_WAITING = 1, 8
 _MOST_WORDS = 300
-_REST_S: Final = 30.0
-"""A drone that refused is asked again after so long."""
 _GIVEN_UP_S: Final = 3600.0
 """So long after the end of its time a run that was ordered waits for the drone to be heard."""
 _QUIET: Final = Objection(Cause.QUIET, "these are quiet hours")
@@ -47,10 +44,12 @@ _OFF: Final = Objection(Cause.OFF, "the station was off, or its clock jumped")
 
 @dataclass(frozen=True, slots=True)
 class StationClock:
-    """The time of day, UTC, and how often the schedules are looked at."""
+    """The time of day, UTC; how often the schedules are looked at; and after how long a drone that refused a
+    run is asked again."""
 
     utc_ns: Callable[[], int] = time.time_ns
     step_s: float = 2.0
+    rest_s: float = 30.0
 
 
 THIS_MACHINE: Final = StationClock()
@@ -85,6 +84,14 @@ class ScheduledDrone(Protocol):
     ) -> Planned: ...
 
 
+class Audit(Protocol):
+    """Where it is written down what a schedule did."""
+
+    def write_down(self, who: Identity | None, address: str, act: str, target: str, **outcome: str) -> None:
+        """A line of it."""
+        ...
+
+
 class NightShift:
     """`run` looks at the schedules of the `book` until cancelled; what a run counts is in the `missions`, in
     the `store` and on the drone's floor."""
@@ -95,7 +102,7 @@ class NightShift:
         missions: MissionBook,
         store: GroundStore | None,
         drones: Mapping[str, ScheduledDrone],
-        access: Access,
+        audit: Audit,
         managers: Managers | None = None,
         clock: StationClock = THIS_MACHINE,
     ) -> None:
@@ -103,7 +110,7 @@ class NightShift:
         self._missions = missions
         self._store = store
         self._drones = drones
-        self._access = access
+        self._audit = audit
         self._managers = managers
         self._clock = clock
         self._threads = Threads(_AT_ONCE, _MOST_WAITING, "the schedules are being looked at already")
@@ -204,7 +211,7 @@ class NightShift:
             levels=work.levels,
         )
         await self._threads.run(self._book.write, run)
-        await self._order(schedule, run, drone)
+        await self._order(schedule, run, drone, may_be_started=False)
 
     async def _resume(self, schedule: Schedule, run: Run, now: datetime) -> None:
         """Go on with a run that was ordered and not answered: the link was lost, or the station ended."""
@@ -222,10 +229,13 @@ class NightShift:
         elif over_s >= 0:
             await self._write(replace(run, state=RunState.UNKNOWN, why="the drone did not answer in time"))
         elif not schedule.rule.is_quiet(now) and self._objection(schedule, drone) is None:
-            await self._order(schedule, run, drone)
+            await self._order(schedule, run, drone, may_be_started=True)
 
-    async def _order(self, schedule: Schedule, run: Run, drone: ScheduledDrone) -> None:
-        """Hand the run's plan to the drone and start it; no answer leaves it as it is."""
+    async def _order(
+        self, schedule: Schedule, run: Run, drone: ScheduledDrone, *, may_be_started: bool
+    ) -> None:
+        """Hand the run's plan to the drone and start it; no answer leaves it as it is.  `may_be_started`: a
+        start was sent before, to which nobody answered."""
         status = drone.heard
         seen_ns = 0 if status is None else status.stamp_ns
         try:
@@ -233,9 +243,12 @@ class NightShift:
                 run.nodes, run.levels, run.plan, session=run.session, seen_ns=seen_ns, by_person=False
             )
             start = Act(f"{run.plan}-go", CommandKind.START, "", run.plan, run.session, seen_ns)
+            may_be_started = True
             await drone.act(start, by_person=False)
         except (RunError, InputError) as err:
-            await self._refused(schedule, run, drone, str(err).removeprefix("refused: "))
+            is_same = drone.welcome is not None and drone.welcome.session == run.session
+            state = RunState.WAITING if is_same or not may_be_started else RunState.UNKNOWN
+            await self._refused(schedule, run, state, str(err).removeprefix("refused: "))
             return
         except FlightdError as err:
             _LOG.warning("schedule %s: %s does not answer: %s", schedule.kept.name, drone.name, err)
@@ -247,13 +260,12 @@ class NightShift:
             flown = (count.mission, run.plan, planned.nodes, self._clock.utc_ns())
             await self._threads.run(self._missions.handed_over, *flown)
 
-    async def _refused(self, schedule: Schedule, run: Run, drone: ScheduledDrone, why: str) -> None:
-        """The drone does not take it: that may change, unless another flightd answered than was asked."""
+    async def _refused(self, schedule: Schedule, run: Run, state: RunState, why: str) -> None:
+        """The drone does not take it: that may change, unless another flightd answered than may have started
+        it."""
         now_s = asyncio.get_running_loop().time()
         self._rests = {of: until_s for of, until_s in self._rests.items() if until_s > now_s}
-        self._rests[schedule.id] = now_s + _REST_S
-        is_same = drone.welcome is not None and drone.welcome.session == run.session
-        state = RunState.WAITING if is_same else RunState.UNKNOWN
+        self._rests[schedule.id] = now_s + self._clock.rest_s
         await self._write(replace(run, state=state, cause=Cause.REFUSED.value, why=why))
         self._write_down(schedule, run, "refused", why)
 
@@ -288,7 +300,7 @@ class NightShift:
 
     def _write_down(self, schedule: Schedule, run: Run, outcome: str, text: str) -> None:
         who = Identity(f"schedule {schedule.kept.name}", Role.OPERATOR, "schedule")
-        self._access.write_down(
+        self._audit.write_down(
             who, "", "start", schedule.kept.drone, outcome=outcome, text=text[:_MOST_WORDS], id=run.plan
         )
 
