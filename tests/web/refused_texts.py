@@ -37,6 +37,7 @@ SOURCES = (
     "doctor/calibration.py",
     "doctor/exposure.py",
     "doctor/machine.py",
+    "fleet/schedule",
     "ground",
     "inventory/stock_columns.py",
     "inventory/stock_table.py",
