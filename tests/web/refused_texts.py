@@ -131,8 +131,8 @@ _BROKEN: tuple[Mapping[str, Any], ...] = (
 
 _ERRORS = re.compile(r"(?!Type|Runtime|Assertion)\w*Error")
 _CALLS = frozenset(
-    {"Check", "Event", "Room", "Rule", "SiteMistake", "Threads", "__init__", "_finding", "_read", "_refuse",
-     "answered", "append", "close", "decoded", "error", "json_body", "kill", "missing_extra",
+    {"Check", "Event", "Objection", "Room", "Rule", "SiteMistake", "Threads", "__init__", "_finding", "_read",
+     "_refuse", "answered", "append", "close", "decoded", "error", "json_body", "kill", "missing_extra",
      "note", "ok", "parse_site", "read_draft", "reader", "refusal", "report", "said", "unseen",
      "warning", "withdraw"}
 )  # fmt: skip
