@@ -41,8 +41,9 @@ COMPOSED = {
 }
 """What the program puts together of several texts, where German has it otherwise."""
 NO_TEXTS = re.compile(
-    r"unattended_start = true|flightd\b.*|node, x_m, y_m.*|--\w+.*|\[vision\].*|Esc|out|(?:hall-3)|Content-Type|"
-    r"AbortError|\w+State|(?:Arrow|Back)\w+|Escape|Enter|Home|End|Delete|Deutsch|English|(?:application|image)/.*",
+    r"unattended_start = true|flightd\b.*|node, x_m, y_m.*|--\w+.*|\[vision\].*|Esc|out|(?:hall-3)|"
+    r"Content-Type|AbortError|\w+State|(?:Arrow|Back)\w+|Escape|Enter|Home|End|Delete|Deutsch|English|"
+    r"(?:application|image)/.*",
     re.DOTALL,
 )
 """What is typed or pressed as it stands, and names of the browser's own."""

@@ -254,7 +254,6 @@ export default {
   "a person commanded the drone less than {seconds} s ago": "ein Mensch hat die Drohne vor weniger als {seconds} s befehligt",
   "the drone takes no start": "die Drohne nimmt keinen Start an",
   "the drone is not heard": "die Drohne wird nicht gehört",
-  "there is no drone {drone}": "eine Drohne {drone} gibt es nicht",
   "these are quiet hours": "jetzt ist Ruhezeit",
   "the station was off, or its clock jumped": "die Station war aus, oder ihre Uhr sprang",
   "all of a site is counted by the ground store, and there is none": "eine ganze Halle wird nach dem Bodenspeicher gezählt, und es gibt keinen",
