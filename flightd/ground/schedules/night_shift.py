@@ -121,7 +121,11 @@ class NightShift:
     async def run(self) -> None:
         """Look, and look again."""
         while True:
-            await self.step()
+            try:
+                await self.step()
+                self._note("step", "")
+            except Exception as err:  # noqa: BLE001 - its end would be the station's
+                self._note("step", f"the schedules failed: {err!r}")
             await asyncio.sleep(self._clock.step_s)
 
     async def step(self) -> None:

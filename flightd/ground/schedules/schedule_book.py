@@ -116,7 +116,7 @@ class ScheduleBook:
                 "SELECT id, kept, since_ns FROM schedule WHERE ? IN ('', site) ORDER BY name COLLATE NOCASE",
                 (site,),
             ).fetchall()
-        return [Schedule(str(one), _kept(text), int(since)) for one, text, since in rows]
+            return [Schedule(str(one), _kept(text), int(since)) for one, text, since in rows]
 
     def keep(self, identity: str, kept: Kept, now_ns: int) -> Schedule:
         """Keep a schedule from now on, in place of the one with its id.  RunError for a name that the site's
@@ -149,7 +149,7 @@ class ScheduleBook:
             return []
         with self._database.opened() as book:
             rows = book.execute(_RUNS, (schedule, since.isoformat(), most)).fetchall()
-        return [_run(row) for row in rows]
+            return [_run(row) for row in rows]
 
     def write(self, run: Run) -> None:
         """Write down how far a run is, before anything is done by it.  InputError where its schedule is

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sqlite3
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
@@ -270,6 +271,15 @@ def test_a_file_that_cannot_be_written_starts_nothing(station: Station) -> None:
     with pytest.raises(InputError, match="not the schedules"):
         station.look()
     assert station.drone.starts == []
+
+
+def test_a_run_that_cannot_be_read_is_one_clear_line_and_no_start(station: Station) -> None:
+    station.at("01T22:00").look()
+    with sqlite3.connect(station.folder / FILE) as file:
+        file.execute("UPDATE run SET state = 'flown'")
+    with pytest.raises(InputError, match=r"schedules.db: not the schedules of a ground station"):
+        station.at("02T22:00").look()
+    assert station.drone.starts == [date(2026, 3, 1)]
 
 
 STATUS: list[tuple[dict[str, Any], Cause]] = [
