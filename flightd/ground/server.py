@@ -20,6 +20,7 @@ from flightd.config.ground import is_loopback
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.access.access import Access
 from flightd.ground.application import application
+from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.flights.flights import Flights
 from flightd.ground.ground_store.feeder import Feeder
 from flightd.ground.ground_store.store import GroundStore
@@ -47,6 +48,7 @@ PORT = 8080
 _PING_S = 4.0
 """A page that does not answer for so long is closed: whoever cannot see does not attend."""
 _LEAVE_S = 2
+_HALT_S = 2.0
 _LAST_PORT = 65535
 _LISTEN = re.compile(r"(?P<host>\[[0-9a-fA-F:.%]+\]|[^:\[\]]+)(:(?P<port>\d{1,5}))?")
 
@@ -149,6 +151,7 @@ def run(
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
     hooks: Sequence[Webhook] = (),
+    own_fleet: OwnFleet | None = None,
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
     InputError where it must not be listened at (`check_reach`)."""
@@ -171,6 +174,7 @@ def run(
                 fleet,
                 store,
                 hooks,
+                own_fleet,
             )
         )
         end_on_signals(serving, came)
@@ -195,14 +199,18 @@ async def serve(
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
     hooks: Sequence[Webhook] = (),
+    own_fleet: OwnFleet | None = None,
     clock: StationClock = THIS_MACHINE,
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
     end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are;
     `fleet` has the drones flown by somebody else's manager; `store` is fed with what lies there, asked by
-    programs, and `hooks` are told of it; the schedules kept in `folder` go by the `clock`."""
-    viewers = viewers if fleet is None else (*viewers, fleet)
-    hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
+    programs, and `hooks` are told of it; `own_fleet` is flown by the station itself; the schedules kept in
+    `folder` go by the `clock`."""
+    viewers = (*viewers, *(viewer for viewer in (fleet, own_fleet) if viewer is not None))
+    managers = fleet if own_fleet is None else own_fleet
+    hub = Hub(drones, viewers, attends=own_fleet is not None)
+    flights, uploads = Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
     simulated = None if folder is None else SimulatedFlight(hub, folder, where.is_beyond)
     people = PagePeople(access, hub.drones)
@@ -224,8 +232,9 @@ async def serve(
                 studio,
                 simulated,
                 others,
-                fleet,
+                managers,
                 store,
+                own_fleet,
                 clock,
             ),
             http="h11",
@@ -248,10 +257,12 @@ async def serve(
     async with asyncio.TaskGroup() as tasks:
         station = tasks.create_task(hub.run(), name="hub")
         tasks.create_task(flights.run(), name="flights")
-        managed = [] if fleet is None else [tasks.create_task(fleet.run(hub), name="fleet")]
+        managed = [
+            tasks.create_task(one.run(hub), name="fleet") for one in (fleet, own_fleet) if one is not None
+        ]
         if folder is not None:
             book, missions = ScheduleBook(folder), MissionBook(folder)
-            shift = NightShift(book, missions, store, hub.drones, access, fleet, clock)
+            shift = NightShift(book, missions, store, hub.drones, access, managers, clock)
             tasks.create_task(shift.run(), name="schedules")
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")
@@ -271,11 +282,13 @@ async def serve(
             while not server.started:  # noqa: ASYNC110 - it tells nobody
                 await asyncio.sleep(0.01)
             on_ready(where)
-            await station
+            await asyncio.shield(station)  # the links outlive what is flown by them
         finally:
             server.should_exit = True
             for one in managed:
                 one.cancel()
+            if own_fleet is not None:
+                await asyncio.wait([asyncio.ensure_future(own_fleet.leave())], timeout=_HALT_S)
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.shield(asyncio.wait([serving], timeout=_LEAVE_S + 2.0))
             uploads.close()

@@ -18,6 +18,7 @@ from websockets.typing import Origin
 
 from flightd.adapters.ground_link.client import Address
 from flightd.ground.access.access import Access
+from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.hub import Viewer
 from flightd.ground.mqtt.fleet_link import FleetLink
@@ -108,6 +109,7 @@ async def served(
     send_buffer: int | None = None,
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
+    own_fleet: OwnFleet | None = None,
     clock: StationClock = THIS_MACHINE,
 ) -> AsyncIterator[Station]:
     """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`; its system
@@ -129,6 +131,7 @@ async def served(
                 viewers=viewers,
                 fleet=fleet,
                 store=store,
+                own_fleet=own_fleet,
                 clock=clock,
             )
         )
