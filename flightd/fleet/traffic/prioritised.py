@@ -20,6 +20,7 @@ from flightd.fleet.traffic.motions import NEVER, MotionNet, vertex_of
 from flightd.fleet.traffic.plan import Plan, occupancy
 from flightd.fleet.traffic.reservations import ReservationTable
 from flightd.fleet.traffic.sipp import Effort, Sipp
+from flightd.fleet.traffic.steps import StepTable
 from flightd.fleet.traffic.tours import Request, plan_tour
 
 _RAISED_AT_MOST: Final = 4
@@ -55,6 +56,7 @@ class PrioritisedPlanner:
     def __init__(self, net: MotionNet, conflicts: Conflicts, weight: float = WEIGHT) -> None:
         self._net = net
         self._conflicts = conflicts
+        self._steps = StepTable(net)
         self.distances = Distances(net)
         self.weight = weight
 
@@ -78,13 +80,12 @@ class PrioritisedPlanner:
 
     def sipp(self, table: ReservationTable) -> Sipp:
         """A search in a table."""
-        return Sipp(self._net, self.distances, table, self.weight)
+        return Sipp(self._net, self.distances, table, self.weight, self._steps)
 
     def book(self, table: ReservationTable, request: Request, plan: Plan) -> None:
         """Take what a plan takes, the end of it for good."""
         place = vertex_of(request.configuration)
-        for resource, from_ms, to_ms in occupancy(plan.actions, place, request.at_ms, NEVER):
-            table.take(request.drone, resource, from_ms, to_ms)
+        table.take_all(request.drone, occupancy(plan.actions, place, request.at_ms, NEVER))
 
 
 class _Round:
