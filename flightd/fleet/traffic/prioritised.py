@@ -24,6 +24,8 @@ from flightd.fleet.traffic.steps import StepTable
 from flightd.fleet.traffic.tours import Request, plan_tour
 
 _RAISED_AT_MOST: Final = 4
+_START: Final = "start of "
+"""Before the name of a drone: the holder of the air in which it stands until it is planned."""
 WEIGHT: Final = 2.0
 """Of the estimate against the time flown (bounded-suboptimal SIPP, K. Yakovlev et al. 2020): a leg takes at
 most so much longer than the shortest one, and is found much sooner where many drones have to wait."""
@@ -107,19 +109,31 @@ class _Round:
         heapq.heapify(queue)
         ties = len(queue)
         without: list[str] = []
+        for drone in self._requests:
+            self._hold(drone)
         while queue:
             _, _, drone = heapq.heappop(queue)
+            self._shared.give_back(_START + drone)
             plan: Plan | None = self._try(drone, self._table_for(drone))
             if plan is None and self._raised[drone] < _RAISED_AT_MOST:
                 plan, displaced = self._raise(drone)
                 for other in displaced:
                     ties += 1
+                    self._hold(other)
                     heapq.heappush(queue, (self._rank[other], ties, other))
             if plan is None:
                 without.append(drone)
             else:
                 self._keep(drone, plan)
         return Planned(self._plans, tuple(without), self._states)
+
+    def _hold(self, drone: str) -> None:
+        """Keep the air in which a drone stands until it is planned, if it may stay there: so that those
+        before it shut it in nowhere."""
+        request = self._requests[drone]
+        place = vertex_of(request.configuration)
+        if place in request.ends:
+            self._shared.take(_START + drone, place, 0, NEVER)
 
     def _table_for(self, drone: str) -> ReservationTable:
         if drone not in self._fixed.closed_for:
