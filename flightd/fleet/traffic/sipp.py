@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import heapq
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -19,10 +19,13 @@ from flightd.fleet.traffic.distances import Distances
 from flightd.fleet.traffic.motions import NEVER, Act, Motion, MotionNet, Part
 from flightd.fleet.traffic.plan import Action, Stop, actions_of
 from flightd.fleet.traffic.reservations import FREE_FROM, ReservationTable
-from flightd.fleet.traffic.steps import StepTable, Sweep
+from flightd.fleet.traffic.sections import NONE
+from flightd.fleet.traffic.steps import Step, StepTable, Sweep
 
 _Window: TypeAlias = tuple[int, int]
 """From and to, milliseconds; both ends belong to it."""
+_Onward: TypeAlias = Callable[[int], Sequence[Step]]
+"""The steps that begin in a configuration."""
 _State: TypeAlias = tuple[float, int, int, int, int, int, int, Motion | None]
 """Estimate, -arrival, tie, configuration (-1: the goal, done), earliest and latest arrival, number of the state
 before (-1: the start), motion from there."""
@@ -76,7 +79,28 @@ class Sipp:
         if rest_ms[configuration >> 3] >= NEVER:
             return
         left_ms = self._steps.left_ms(rest_ms, goal.vertex, self._weight)
-        yield from _Search(self._steps, self._table, left_ms, goal, effort).run(configuration, at_ms)
+        if self._weight > 1.0:
+            onward = self._through(configuration >> 3, goal.vertex)
+            found = False
+            for leg in _Search(onward, self._table, left_ms, goal, effort).run(configuration, at_ms):
+                found = True
+                yield leg
+            if found:
+                return
+        yield from _Search(self._steps.onward, self._table, left_ms, goal, effort).run(configuration, at_ms)
+
+    def _through(self, start: int, goal: int) -> _Onward:
+        """The steps of a drone that stops in no section of an aisle but in those of its start and goal."""
+        stays_in = {self._steps.sections[start], self._steps.sections[goal]} - {NONE}
+        onward, through, sections = self._steps.onward, self._steps.through, self._steps.sections
+
+        def steps(configuration: int) -> tuple[Step, ...]:
+            if sections[configuration >> 3] != NONE:
+                return onward(configuration)
+            found, entered = through(configuration)
+            return onward(configuration) if entered in stays_in else found
+
+        return steps
 
 
 class _Search:
@@ -85,13 +109,13 @@ class _Search:
 
     def __init__(
         self,
-        steps: StepTable,
+        onward: _Onward,
         table: ReservationTable,
         left_ms: tuple[Sequence[float], Sequence[float]],
         goal: Stop,
         effort: Effort,
     ) -> None:
-        self._onward = steps.onward
+        self._onward = onward
         self._starts = table.starts
         self._ends = table.ends
         self._goal = goal

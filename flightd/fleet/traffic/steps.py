@@ -4,9 +4,11 @@ themselves at their ends."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TypeAlias
 
-from flightd.fleet.traffic.motions import Act, Motion, MotionNet
+from flightd.fleet.traffic.motions import Act, Motion, MotionNet, Part
+from flightd.fleet.traffic.sections import NONE, sections_of
 
 Sweep: TypeAlias = tuple[int, int, int]
 """A resource, and when it is taken from and to after the start of the motion."""
@@ -20,6 +22,7 @@ class StepTable:
     def __init__(self, net: MotionNet) -> None:
         self._net = net
         self._steps: dict[int, tuple[Step, ...]] = {}
+        self._through: dict[int, tuple[tuple[Step, ...], int]] = {}
         self.stop_ms = net.stop_ms if net.ramps_fit else 0
         """A stop is surely left where the drone moves."""
         self.launch_ms = net.launch_ms if net.ramps_fit else 0
@@ -37,6 +40,45 @@ class StepTable:
             found = tuple(_step(motion) for motion in self._net.onward(configuration))
             self._steps[configuration] = found
         return found
+
+    def through(self, configuration: int) -> tuple[tuple[Step, ...], int]:
+        """The same without stops in sections of aisles far from any crossing: those are flown through in one
+        step.  With the section that is entered, NONE where there is none."""
+        found = self._through.get(configuration)
+        if found is None:
+            entered = NONE
+            steps: list[Step] = []
+            for step in self.onward(configuration):
+                section = self.sections[step[1]]
+                if section == NONE:
+                    steps.append(step)
+                    continue
+                entered = section
+                if step[0] & 1 and (motion := self._flown_through(step[4])) is not None:
+                    steps.append(_step(motion))
+            found = self._through[configuration] = tuple(steps), entered
+        return found
+
+    def _flown_through(self, motion: Motion) -> Motion | None:
+        """A motion that ends moving, and cruising on until the section is left; None where it leads
+        nowhere."""
+        parts = list(motion.parts)
+        target, duration_ms = motion.target, motion.duration_ms
+        while self.sections[target >> 3] != NONE:
+            cruise = next((each for each in self._net.onward(target) if each.target & 1), None)
+            if cruise is None:
+                return None
+            parts += [
+                Part(p.act, p.resource, p.vertex, p.in_ms + duration_ms, p.out_ms + duration_ms)
+                for p in cruise.parts
+            ]
+            target, duration_ms = cruise.target, duration_ms + cruise.duration_ms
+        return Motion(target, duration_ms, tuple(parts))
+
+    @cached_property
+    def sections(self) -> Sequence[int]:
+        """The section of each vertex, or NONE."""
+        return sections_of(self._net.lanes)
 
     def left_ms(
         self, rest_ms: Sequence[int], goal: int, weight: float
