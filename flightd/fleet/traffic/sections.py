@@ -8,7 +8,7 @@ from typing import Final
 from flightd.fleet.traffic.lanes import UPRIGHT, Lane, LaneGraph
 
 NONE: Final = -1
-ASIDE: Final = 1
+ASIDE: Final = 2
 """So many nodes beside a crossing a drone may step aside."""
 
 
