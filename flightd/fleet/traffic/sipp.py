@@ -40,20 +40,12 @@ class Leg:
     end_ms: int
 
 
+@dataclass(slots=True)
 class Effort:
-    """How many states may still be expanded, over several searches."""
+    """How many states may be expanded, and were, over several searches."""
 
-    def __init__(self, most: int) -> None:
-        self.left = most
-        self.spent = 0
-
-    def take(self) -> bool:
-        """One more; False when there is none left."""
-        if self.left <= 0:
-            return False
-        self.left -= 1
-        self.spent += 1
-        return True
+    most: int
+    spent: int = 0
 
 
 class Sipp:
@@ -78,16 +70,16 @@ class Sipp:
         rest_ms = self._distances.to(goal.vertex)
         if rest_ms[configuration >> 3] >= NEVER:
             return
-        left_ms = self._steps.left_ms(rest_ms, goal.vertex, self._weight)
+        guide = _Guide(self._steps, rest_ms, goal.vertex, self._weight)
         if self._weight > 1.0:
             onward = self._through(configuration >> 3, goal.vertex)
             found = False
-            for leg in _Search(onward, self._table, left_ms, goal, effort).run(configuration, at_ms):
+            for leg in _Search(onward, self._table, guide, goal, effort).run(configuration, at_ms):
                 found = True
                 yield leg
             if found:
                 return
-        yield from _Search(self._steps.onward, self._table, left_ms, goal, effort).run(configuration, at_ms)
+        yield from _Search(self._steps.onward, self._table, guide, goal, effort).run(configuration, at_ms)
 
     def _through(self, start: int, goal: int) -> _Onward:
         """The steps of a drone that stops in no section of an aisle but in those of its start and goal."""
@@ -103,6 +95,20 @@ class Sipp:
         return steps
 
 
+class _Guide:
+    """What is left to the goal: `weight` times the sum of a vertex's and what is more from everywhere.  A stop is sure where the drone moves, a launch and a stop where it stands over another node
+    than the goal's."""
+
+    def __init__(self, steps: StepTable, rest_ms: Sequence[int], goal: int, weight: float) -> None:
+        self.weight = weight
+        self.moving_more_ms = steps.stop_ms
+        self.resting_more_ms = steps.launch_ms + steps.stop_ms
+        self.moving_ms = rest_ms
+        self.resting_ms = list(rest_ms)
+        for vertex in steps.beside(goal):
+            self.resting_ms[vertex] -= self.resting_more_ms
+
+
 class _Search:
     """One search.  A state at rest is a safe interval and the earliest arrival in it; a moving one is an
     interval of arrivals, of which none was in the queue before."""
@@ -111,7 +117,7 @@ class _Search:
         self,
         onward: _Onward,
         table: ReservationTable,
-        left_ms: tuple[Sequence[float], Sequence[float]],
+        guide: _Guide,
         goal: Stop,
         effort: Effort,
     ) -> None:
@@ -124,8 +130,9 @@ class _Search:
         self._queue: list[_State] = []
         self._tie = 0
         self._best: dict[tuple[int, int], int] = {}
+        self._kept: dict[int, Sequence[Step]] = {}
         self._covered: dict[int, tuple[list[int], list[int]]] = {}
-        self._resting_ms, self._moving_ms = left_ms
+        self._guide = guide
 
     def run(self, configuration: int, at_ms: int) -> Iterator[Leg]:
         until = self._safe_until(configuration >> 3, at_ms)
@@ -135,7 +142,7 @@ class _Search:
         self._push(0, configuration, at_ms, until, None)
         done: set[int] = set()
         goal_vertex = self._goal.vertex
-        queue, states, best, take = self._queue, self._states, self._best, self._effort.take
+        queue, states, best, effort = self._queue, self._states, self._best, self._effort
         while queue:
             state = heapq.heappop(queue)
             here, low, high = state[3], state[4], state[5]
@@ -146,8 +153,9 @@ class _Search:
                 continue
             if not here & 1 and best[here, high] < low:  # reached sooner since
                 continue
-            if not take():
+            if effort.spent >= effort.most:
                 return
+            effort.spent += 1
             states.append(state)
             if here >> 3 == goal_vertex and not here & 1:
                 self._finish(here, low, high)
@@ -176,13 +184,12 @@ class _Search:
 
     def _expand(self, here: int, low: int, high: int) -> None:
         """Every safe arrival by the motions that begin here between `low` and `high`."""
-        best, queue = self._best, self._queue
+        best, queue, guide = self._best, self._queue, self._guide
+        weight = guide.weight
         before = len(self._states) - 1
-        for target, vertex, duration_ms, sweeps, motion in self._onward(here):
-            if (left_ms := self._resting_ms[vertex]) >= NEVER:
-                continue
+        for target, vertex, duration_ms, sweeps, motion in self._steps(here):
             if target & 1:
-                left_ms = self._moving_ms[vertex]
+                left_ms = weight * (guide.moving_ms[vertex] + guide.moving_more_ms)
                 for first, last in self._departures(sweeps, low, high):
                     latest = min(last + duration_ms, NEVER)
                     for arrival, until in self._uncovered(target, first + duration_ms, latest):
@@ -191,6 +198,7 @@ class _Search:
                         heapq.heappush(queue, item)
                 continue
             # at rest only the earliest arrival in a safe interval matters, for it can wait
+            left_ms = weight * (guide.resting_ms[vertex] + guide.resting_more_ms)
             for arrival, until in self._rests(vertex, duration_ms, sweeps, low, high):
                 key = target, until
                 if best.get(key, NEVER) > arrival:
@@ -198,6 +206,15 @@ class _Search:
                     self._tie += 1
                     item = arrival + left_ms, -arrival, self._tie, target, arrival, until, before, motion
                     heapq.heappush(queue, item)
+
+    def _steps(self, here: int) -> Sequence[Step]:
+        """Those that begin in a configuration, and from whose end the goal can be reached."""
+        found = self._kept.get(here)
+        if found is None:
+            left_ms = self._guide.moving_ms
+            found = [step for step in self._onward(here) if left_ms[step[1]] < NEVER]
+            self._kept[here] = found
+        return found
 
     def _rests(
         self, vertex: int, duration_ms: int, sweeps: Sequence[Sweep], low: int, high: int

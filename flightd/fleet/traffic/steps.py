@@ -80,16 +80,9 @@ class StepTable:
         """The section of each vertex, or NONE."""
         return sections_of(self._net.lanes)
 
-    def left_ms(
-        self, rest_ms: Sequence[int], goal: int, weight: float
-    ) -> tuple[Sequence[float], Sequence[float]]:
-        """What is left from each vertex, at rest and moving, times `weight`, when cruising there takes
-        `rest_ms`; a stop and a launch are sure where the goal is over another node."""
-        stop_ms, ramps_ms = self.stop_ms, self.launch_ms + self.stop_ms
-        resting = [weight * (left + ramps_ms) for left in rest_ms]
-        for vertex in self._beside[goal]:
-            resting[vertex] = weight * rest_ms[vertex]
-        return resting, [weight * (left + stop_ms) for left in rest_ms]
+    def beside(self, vertex: int) -> Sequence[int]:
+        """The vertices over the same node, itself among them."""
+        return self._beside[vertex]
 
 
 def _step(motion: Motion) -> Step:
