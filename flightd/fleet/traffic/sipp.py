@@ -27,8 +27,8 @@ _Window: TypeAlias = tuple[int, int]
 _Onward: TypeAlias = Callable[[int], Sequence[Step]]
 """The steps that begin in a configuration."""
 _State: TypeAlias = tuple[float, int, int, int, int, int, int, Motion | None]
-"""Estimate, -arrival, tie, configuration (-1: the goal, done), earliest and latest arrival, number of the state
-before (-1: the start), motion from there."""
+"""Estimate, -arrival, tie, configuration (-1: the goal, done), earliest and latest arrival, number of the
+state before (-1: the start), motion from there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +96,9 @@ class Sipp:
 
 
 class _Guide:
-    """What is left to the goal: `weight` times the sum of a vertex's and what is more from everywhere.  A stop is sure where the drone moves, a launch and a stop where it stands over another node
-    than the goal's."""
+    """What is left to the goal: `weight` times the sum of a vertex's and what is more from everywhere.  A
+    stop is sure where the drone moves, a launch and a stop where it stands over another node than the
+    goal's."""
 
     def __init__(self, steps: StepTable, rest_ms: Sequence[int], goal: int, weight: float) -> None:
         self.weight = weight
@@ -188,6 +189,8 @@ class _Search:
         weight = guide.weight
         before = len(self._states) - 1
         for target, vertex, duration_ms, sweeps, motion in self._steps(here):
+            if guide.moving_ms[vertex] >= NEVER:
+                continue
             if target & 1:
                 left_ms = weight * (guide.moving_ms[vertex] + guide.moving_more_ms)
                 for first, last in self._departures(sweeps, low, high):
@@ -208,12 +211,10 @@ class _Search:
                     heapq.heappush(queue, item)
 
     def _steps(self, here: int) -> Sequence[Step]:
-        """Those that begin in a configuration, and from whose end the goal can be reached."""
+        """Those that begin in a configuration, kept for this search."""
         found = self._kept.get(here)
         if found is None:
-            left_ms = self._guide.moving_ms
-            found = [step for step in self._onward(here) if left_ms[step[1]] < NEVER]
-            self._kept[here] = found
+            found = self._kept[here] = self._onward(here)
         return found
 
     def _rests(
@@ -245,14 +246,15 @@ class _Search:
             ends = ends_of[resource]
             narrowed: list[_Window] = []
             for begins, until in found:
-                k = bisect_right(starts, begins + in_ms) - 1
-                for k in range(k if k > 0 else 0, len(starts)):
+                around = bisect_right(starts, begins + in_ms) - 1
+                for k in range(max(around, 0), len(starts)):
                     first = starts[k] - in_ms
                     if first > until:
                         break
                     last = ends[k] - out_ms
-                    first = begins if first < begins else first
-                    last = until if last > until else last
+                    # max() and min() would take longer
+                    first = begins if first < begins else first  # noqa: FURB136
+                    last = until if last > until else last  # noqa: FURB136
                     if first <= last:
                         narrowed.append((first, last))
             if not narrowed:

@@ -3,7 +3,7 @@ themselves at their ends."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TypeAlias
 
@@ -54,26 +54,22 @@ class StepTable:
                     steps.append(step)
                     continue
                 entered = section
-                if step[0] & 1 and (motion := self._flown_through(step[4])) is not None:
-                    steps.append(_step(motion))
+                if step[0] & 1:
+                    steps += map(_step, self._flown_through(step[4]))
             found = self._through[configuration] = tuple(steps), entered
         return found
 
-    def _flown_through(self, motion: Motion) -> Motion | None:
-        """A motion that ends moving, and cruising on until the section is left; None where it leads
-        nowhere."""
-        parts = list(motion.parts)
-        target, duration_ms = motion.target, motion.duration_ms
-        while self.sections[target >> 3] != NONE:
-            cruise = next((each for each in self._net.onward(target) if each.target & 1), None)
-            if cruise is None:
-                return None
-            parts += [
-                Part(p.act, p.resource, p.vertex, p.in_ms + duration_ms, p.out_ms + duration_ms)
-                for p in cruise.parts
-            ]
-            target, duration_ms = cruise.target, duration_ms + cruise.duration_ms
-        return Motion(target, duration_ms, tuple(parts))
+    def _flown_through(self, motion: Motion) -> Iterator[Motion]:
+        """A motion that ends moving, and cruising on until the section is left, or to a stop beyond it."""
+        cruising: Motion | None = motion
+        while cruising is not None:
+            sofar, cruising = cruising, None
+            for following in self._net.onward(sofar.target):
+                longer = _joined(sofar, following)
+                if self.sections[following.target >> 3] == NONE:
+                    yield longer
+                elif following.target & 1:
+                    cruising = longer
 
     @cached_property
     def sections(self) -> Sequence[int]:
@@ -83,6 +79,13 @@ class StepTable:
     def beside(self, vertex: int) -> Sequence[int]:
         """The vertices over the same node, itself among them."""
         return self._beside[vertex]
+
+
+def _joined(one: Motion, two: Motion) -> Motion:
+    """One after the other, without a pause."""
+    later_ms = one.duration_ms
+    parts = (Part(p.act, p.resource, p.vertex, p.in_ms + later_ms, p.out_ms + later_ms) for p in two.parts)
+    return Motion(two.target, later_ms + two.duration_ms, (*one.parts, *parts))
 
 
 def _step(motion: Motion) -> Step:
