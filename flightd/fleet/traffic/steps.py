@@ -61,15 +61,20 @@ class StepTable:
 
     def _flown_through(self, motion: Motion) -> Iterator[Motion]:
         """A motion that ends moving, and cruising on until the section is left, or to a stop beyond it."""
-        cruising: Motion | None = motion
-        while cruising is not None:
-            sofar, cruising = cruising, None
-            for following in self._net.onward(sofar.target):
-                longer = _joined(sofar, following)
+        parts = list(motion.parts)
+        target, passed_ms = motion.target, motion.duration_ms
+        while True:
+            cruise: Motion | None = None
+            for following in self._net.onward(target):
                 if self.sections[following.target >> 3] == NONE:
-                    yield longer
+                    all_parts = *parts, *_later(following.parts, passed_ms)
+                    yield Motion(following.target, passed_ms + following.duration_ms, all_parts)
                 elif following.target & 1:
-                    cruising = longer
+                    cruise = following
+            if cruise is None:
+                return
+            parts += _later(cruise.parts, passed_ms)
+            target, passed_ms = cruise.target, passed_ms + cruise.duration_ms
 
     @cached_property
     def sections(self) -> Sequence[int]:
@@ -81,11 +86,8 @@ class StepTable:
         return self._beside[vertex]
 
 
-def _joined(one: Motion, two: Motion) -> Motion:
-    """One after the other, without a pause."""
-    later_ms = one.duration_ms
-    parts = (Part(p.act, p.resource, p.vertex, p.in_ms + later_ms, p.out_ms + later_ms) for p in two.parts)
-    return Motion(two.target, later_ms + two.duration_ms, (*one.parts, *parts))
+def _later(parts: Sequence[Part], by_ms: int) -> list[Part]:
+    return [Part(p.act, p.resource, p.vertex, p.in_ms + by_ms, p.out_ms + by_ms) for p in parts]
 
 
 def _step(motion: Motion) -> Step:
