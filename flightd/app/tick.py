@@ -6,9 +6,11 @@ from flightd.adapters.store.progress import LeftOver
 from flightd.app.flight import Flight
 from flightd.app.guarded_step import GuardedStep
 from flightd.app.last_answers import LastAnswers
+from flightd.core.flight_order import ChosenPlan
 from flightd.core.outlook import NO_OUTLOOK
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
+from flightd.core.topics import Topic
 from flightd.core.types import Command, CommandKind, Health
 from flightd.ports import CountsDrops
 
@@ -22,6 +24,8 @@ class Tick:
         self._call = flight.publishers.barrier.call
         self._step = GuardedStep(flight.pilot)
         self._last = LastAnswers()
+        # once: to look for a protocol's members takes as long as a tick's whole status
+        self._counts_drops = flight.vehicle if isinstance(flight.vehicle, CountsDrops) else None
 
     @property
     def output(self) -> TickOutput:
@@ -37,6 +41,8 @@ class Tick:
         tick = self._gather(now_ns)
         output = self._step.step(tick)
         self._obey(output)
+        if any(command.kind is CommandKind.PLAN for command in tick.commands):
+            self._call("recorder", lambda: self._record_plan(now_ns), None)
         self._call(
             "status", lambda: self._flight.publishers.publish(self._snapshot(tick, output, late_s)), None
         )
@@ -99,6 +105,12 @@ class Tick:
         if pilot.learnt is not None:
             self._flight.learnt.put(pilot.learnt)
 
+    def _record_plan(self, now_ns: int) -> None:
+        """What is flown in the order's place, for whoever reads the log."""
+        standing = self._flight.pilot.mission.standing
+        chosen = ChosenPlan(standing.id, standing.nodes if standing.id else (), standing.levels)
+        self._flight.recorder.record(Topic.PLAN, now_ns, chosen)
+
     def _possible_commands(self) -> frozenset[CommandKind]:
         return frozenset() if self._step.escaped else self._flight.pilot.possible_commands
 
@@ -109,8 +121,8 @@ class Tick:
         dropped["recorder"] = flight.recorder.dropped
         dropped["refused"] = flight.camera.refused + flight.front_camera.refused
         dropped["setpoints"] = flight.setpoints.failed
-        if isinstance(flight.vehicle, CountsDrops):
-            dropped["vehicle"] = flight.vehicle.dropped
+        if self._counts_drops is not None:
+            dropped["vehicle"] = self._counts_drops.dropped
         return Snapshot(
             tick,
             output,

@@ -16,3 +16,13 @@ class FlightOrder:
     pad: str | None = None
     start_yaw_rad: float = 0.0
     autostart: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenPlan:
+    """What somebody chose in the order's place before the start, by the command `id`: these `nodes`, counted
+    on these `levels` (none: all).  No nodes: as ordered again."""
+
+    id: str
+    nodes: tuple[str, ...] = ()
+    levels: tuple[int, ...] = ()

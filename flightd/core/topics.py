@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from flightd.core.flight_order import FlightOrder
+from flightd.core.flight_order import ChosenPlan, FlightOrder
 from flightd.core.learnt import LearntSensors
 from flightd.core.scanning import CodeSet, Finding
 from flightd.core.tick import StepFailure
@@ -48,6 +48,7 @@ class Topic(enum.StrEnum):
     CONFIG = "/config"
     MAP = "/map"
     ORDER = "/order"
+    PLAN = "/plan"
     LEARNT = "/learnt"
     SCENE = "/scene"
     DRONE_FRAME = "/drone_frame"
@@ -97,7 +98,9 @@ FOR_VIEWERS = _STANDING | {Topic.DRONE_FRAME}
 FOR_PEOPLE = frozenset(Topic) - {Topic.FRAME, Topic.TICK, Topic.DECISION} - FOR_VIEWERS
 """All but the pictures, what only a replay needs and what only viewers read."""
 
-RETAINED = frozenset({Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.LEARNT, Topic.SCENARIO}) | _STANDING
+RETAINED = (
+    frozenset({Topic.CONFIG, Topic.MAP, Topic.ORDER, Topic.PLAN, Topic.LEARNT, Topic.SCENARIO}) | _STANDING
+)
 """Topics whose newest message holds for the whole flight, so that every log file must carry it."""
 
 MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
@@ -116,6 +119,7 @@ MESSAGE_TYPES: Mapping[str, type] = MappingProxyType(
         Topic.CONFIG: Document,
         Topic.MAP: Document,
         Topic.ORDER: FlightOrder,
+        Topic.PLAN: ChosenPlan,
         Topic.LEARNT: LearntSensors,
         Topic.SCENARIO: Document,
         Topic.UNKNOWNS: Document,

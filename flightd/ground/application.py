@@ -25,6 +25,8 @@ from flightd.ground.access.session_routes import session_routes
 from flightd.ground.acts import Orders
 from flightd.ground.browser import Browser
 from flightd.ground.doctor.routes import doctor_routes
+from flightd.ground.fleet.own_fleet import OwnFleet
+from flightd.ground.fleet.routes import fleet_routes
 from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.routes import flight_routes
 from flightd.ground.ground_store.store import GroundStore
@@ -79,11 +81,13 @@ def application(
     others: Sequence[ReadFolder] = (),
     managers: Managers | None = None,
     store: GroundStore | None = None,
+    own_fleet: OwnFleet | None = None,
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
     `people` who sits at a page, inventories, site files and `flights` lie under `folder`, more inventories
     under the `others`, `uploads` reads what people send, `maps` lays out maps, `studio` and `simulated` are
-    None without a folder; `managers` fly drones, too; programs ask the `store`."""
+    None without a folder; `managers` fly drones, too; programs ask the `store`; `own_fleet` takes
+    tours."""
     orders = Orders(hub.drones, access)
     routes = [
         first_page(),
@@ -96,6 +100,7 @@ def application(
         *doctor_routes(hub.drones, access, None if studio is None else studio.shelf),
         *mission_routes(folder, hub.drones, hub.for_each, others),
         *manager_routes(managers),
+        *fleet_routes(own_fleet, hub, access),
         *store_routes(store),
         *guide_routes(),
         *session_routes(access),

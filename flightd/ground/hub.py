@@ -45,9 +45,12 @@ class Hub:
     again, has everything at once.
 
     A drone is attended while the page of anybody is open who may fly, and no longer: closing the last one is
-    losing the ground."""
+    losing the ground.  A station that flies them itself `attends` as long as it runs."""
 
-    def __init__(self, drones: Sequence[tuple[str, Address]], viewers: Sequence[Viewer] = ()) -> None:
+    def __init__(
+        self, drones: Sequence[tuple[str, Address]], viewers: Sequence[Viewer] = (), *, attends: bool = False
+    ) -> None:
+        self._attends = attends
         self._viewers = tuple(viewers)
         self._latest: dict[Topic, Any] = {}
         self._browsers: set[Browser] = set()
@@ -106,8 +109,9 @@ class Hub:
 
     @property
     def is_attended(self) -> bool:
-        """Some page is open of a person who may fly: who only looks on is no ground for the flight."""
-        return any(browser.attends for browser in self._browsers)
+        """Some page is open of a person who may fly, who only looks on being no ground for the flight; or the
+        station flies them itself."""
+        return self._attends or any(browser.attends for browser in self._browsers)
 
     @property
     def is_full(self) -> bool:

@@ -20,6 +20,7 @@ from flightd.config.ground import is_loopback
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.access.access import Access
 from flightd.ground.application import application
+from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.flights.flights import Flights
 from flightd.ground.ground_store.feeder import Feeder
 from flightd.ground.ground_store.store import GroundStore
@@ -44,6 +45,7 @@ PORT = 8080
 _PING_S = 4.0
 """A page that does not answer for so long is closed: whoever cannot see does not attend."""
 _LEAVE_S = 2
+_HALT_S = 2.0
 _LAST_PORT = 65535
 _LISTEN = re.compile(r"(?P<host>\[[0-9a-fA-F:.%]+\]|[^:\[\]]+)(:(?P<port>\d{1,5}))?")
 
@@ -146,6 +148,7 @@ def run(
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
     hooks: Sequence[Webhook] = (),
+    own_fleet: OwnFleet | None = None,
 ) -> signal.Signals | None:
     """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
     InputError where it must not be listened at (`check_reach`)."""
@@ -168,6 +171,7 @@ def run(
                 fleet,
                 store,
                 hooks,
+                own_fleet,
             )
         )
         end_on_signals(serving, came)
@@ -192,13 +196,15 @@ async def serve(
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
     hooks: Sequence[Webhook] = (),
+    own_fleet: OwnFleet | None = None,
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
     end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are;
     `fleet` has the drones flown by somebody else's manager; `store` is fed with what lies there, asked by
-    programs, and `hooks` are told of it."""
-    viewers = viewers if fleet is None else (*viewers, fleet)
-    hub, flights, uploads = Hub(drones, viewers), Flights(folder, others=others), ReadingProcess()
+    programs, and `hooks` are told of it; `own_fleet` is flown by the station itself."""
+    viewers = (*viewers, *(viewer for viewer in (fleet, own_fleet) if viewer is not None))
+    hub = Hub(drones, viewers, attends=own_fleet is not None)
+    flights, uploads = Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
     simulated = None if folder is None else SimulatedFlight(hub, folder, where.is_beyond)
     people = PagePeople(access, hub.drones)
@@ -220,8 +226,9 @@ async def serve(
                 studio,
                 simulated,
                 others,
-                fleet,
+                fleet if own_fleet is None else own_fleet,
                 store,
+                own_fleet,
             ),
             http="h11",
             ws=PageSocket,
@@ -243,7 +250,9 @@ async def serve(
     async with asyncio.TaskGroup() as tasks:
         station = tasks.create_task(hub.run(), name="hub")
         tasks.create_task(flights.run(), name="flights")
-        managed = [] if fleet is None else [tasks.create_task(fleet.run(hub), name="fleet")]
+        managed = [
+            tasks.create_task(one.run(hub), name="fleet") for one in (fleet, own_fleet) if one is not None
+        ]
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")
         if simulated is not None:
@@ -262,11 +271,13 @@ async def serve(
             while not server.started:  # noqa: ASYNC110 - it tells nobody
                 await asyncio.sleep(0.01)
             on_ready(where)
-            await station
+            await asyncio.shield(station)  # the links outlive what is flown by them
         finally:
             server.should_exit = True
             for one in managed:
                 one.cancel()
+            if own_fleet is not None:
+                await asyncio.wait([asyncio.ensure_future(own_fleet.leave())], timeout=_HALT_S)
             with contextlib.suppress(asyncio.CancelledError):
                 await asyncio.shield(asyncio.wait([serving], timeout=_LEAVE_S + 2.0))
             uploads.close()

@@ -32,11 +32,11 @@ class Warnings:
 
     Pictures: age of the newest, and since when they are the same or show nothing.  `heading_error_rad` is
     what the lines say against the vehicle's heading, `height_doubted` that their width contradicts the
-    height, `height_stuck` that the height does not follow the climb of the vehicle, `climb_wrong` that
-    the climb does not follow the height, by `climb_error_mps` (how much too great it is told),
-    `push_mps2` the acceleration that no lean explains, `off_m` the distance from the reference while
-    steering, `swings` that the drone swings about it, `headroom_m` the way up to the ceiling's margin,
-    `outside_m` how far outside the corridor, whose
+    height, by `height_error_m` (how much too high it is told), `height_stuck` that the height does not
+    follow the climb of the vehicle, `climb_wrong` that the climb does not follow the height, by
+    `climb_error_mps` (how much too great it is told), `push_mps2` the acceleration that no lean explains,
+    `off_m` the distance from the reference while steering, `swings` that the drone swings about it,
+    `headroom_m` the way up to the ceiling's margin, `outside_m` how far outside the corridor, whose
     nearest line is at `line_m`; `tick_s` the mean time between ticks."""
 
     frame_age_s: float = 0.0
@@ -44,6 +44,7 @@ class Warnings:
     blank_s: float = 0.0
     heading_error_rad: float = 0.0
     height_doubted: bool = False
+    height_error_m: float = 0.0
     height_stuck: bool = False
     climb_wrong: bool = False
     climb_error_mps: float = 0.0
@@ -95,6 +96,11 @@ class MissionInputs:
     aisle_closed: bool = True
     features_age_s: float = math.inf
     commanded: AttitudeSetpoint | None = None
+
+    @property
+    def believed_height_m(self) -> float:
+        """The height as it is told, by the lines' width where that contradicts it."""
+        return self.height_m - (self.warnings.height_error_m if self.warnings.height_doubted else 0.0)
 
     @property
     def sight_s(self) -> float:

@@ -56,6 +56,7 @@ class LogChunks:
         self.metadata: dict[str, str] = {}
         self.whole = False
         self._channels: dict[int, str] = {}
+        self._size = os.fstat(self._stream.fileno()).st_size
         self._scan()
 
     def __enter__(self) -> Self:
@@ -81,6 +82,21 @@ class LogChunks:
                 elif record.opcode in {Opcode.CHANNEL, Opcode.METADATA}:
                     self._take(record.opcode, record.content)
 
+    def chunks_with(self, topic: str) -> list[RecordSpan]:
+        """The chunks in which messages of a topic stand, as their indexes say; none is unpacked."""
+        channels = {channel for channel, name in self._channels.items() if name == topic}
+        found: dict[int, RecordSpan] = {}
+        chunk: RecordSpan | None = None
+        for span in record_spans(self._read_at, len(MAGIC), self._size) if channels else ():
+            if span.opcode == Opcode.CHUNK:
+                chunk = span
+            elif span.opcode == Opcode.MESSAGE_INDEX and chunk is not None:
+                if int.from_bytes(self._read_at(span.offset + RECORD_HEAD, 2), "little") in channels:
+                    found[chunk.offset] = chunk
+            elif span.opcode == Opcode.DATA_END:
+                break
+        return list(found.values())
+
     def payload_at(self, chunk_at: int, inner_at: int) -> bytes:
         """The payload of a message that was found before, empty where it is there no more."""
         span = next((span for span in self.chunks if span.offset == chunk_at), None)
@@ -92,8 +108,7 @@ class LogChunks:
         return b""
 
     def _scan(self) -> None:
-        size = os.fstat(self._stream.fileno()).st_size
-        for span in record_spans(self._read_at, len(MAGIC), size):
+        for span in record_spans(self._read_at, len(MAGIC), self._size):
             if span.opcode == Opcode.DATA_END:
                 self.whole = True
                 return

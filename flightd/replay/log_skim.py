@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
 import msgspec
 
-from flightd.core.flight_order import FlightOrder
+from flightd.core.flight_order import ChosenPlan, FlightOrder
 from flightd.core.topics import RETAINED, Document, Topic
 from flightd.core.types import Status
 from flightd.replay.log import converted, with_nan
@@ -28,7 +28,7 @@ T = TypeVar("T")
 class SkimmedLog:
     """`whole`: it was closed as it should be.  `first_ns`, `last_ns`: stamps of the first and the last
     message of the flight, equal where there is none.  `site` is its name and `vehicle` its kind, "" where
-    that is not recorded."""
+    that is not recorded; `order` has the nodes of the plan that was chosen last, if any was."""
 
     whole: bool
     first_ns: int = 0
@@ -48,7 +48,7 @@ def skim(path: Path) -> SkimmedLog:
     """Look at a log.  InputError if it cannot be opened or is not MCAP; what is damaged in it is passed
     over."""
     with LogChunks(path) as log:
-        site, vehicle, order, first_ns = "", "", None, 0
+        site, vehicle, order, chosen, first_ns = "", "", None, None, 0
         for found in log.messages(log.chunks[:_FIRST_CHUNKS]):
             if found.topic == Topic.MAP:
                 site = _site_name(_decoded(Document, found.payload))
@@ -58,6 +58,10 @@ def skim(path: Path) -> SkimmedLog:
                 order = _decoded(FlightOrder, found.payload)
             elif found.topic not in RETAINED:
                 first_ns = min(first_ns or found.stamp_ns, found.stamp_ns)
+        for found in log.messages(log.chunks_with(Topic.PLAN)[-1:], {Topic.PLAN}):
+            chosen = _decoded(ChosenPlan, found.payload)
+        if chosen is not None and chosen.nodes:
+            order = replace(order or FlightOrder(), nodes=chosen.nodes)
         last_ns, newest = _end(log)
         last_ns = max(last_ns, first_ns)
         first_ns = first_ns or last_ns

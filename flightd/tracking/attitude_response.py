@@ -66,9 +66,14 @@ class _Kept:
     def at(self, times_ns: Matrix) -> Matrix:
         """(N, models, 3) the undelayed answers at (N,) times; beyond what is kept its first and last."""
         times, answers = self._times[: self._count], self._answers[: self._count]
-        after = np.clip(np.searchsorted(times, times_ns), 1, self._count - 1)
-        share = np.clip((times_ns - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
-        between: Matrix = answers[after - 1] + share[:, None, None] * (answers[after] - answers[after - 1])
+        after = np.searchsorted(times, times_ns)
+        np.maximum(
+            np.minimum(after, self._count - 1, out=after), 1, out=after
+        )  # np.clip takes five times as long
+        before, old_ns = answers[after - 1], times[after - 1]
+        share = (times_ns - old_ns) / (times[after] - old_ns)
+        np.maximum(np.minimum(share, 1.0, out=share), 0.0, out=share)
+        between: Matrix = before + share[:, None, None] * (answers[after] - before)
         return between
 
 
@@ -170,7 +175,8 @@ class AttitudeResponse:
         if not told_s or self._settled_s < 0.5:
             return
         self._seen_s = min(self._seen_s + told_s, _MEMORY_S)
-        off = ((errors - self._steady) ** 2).mean(axis=2)
+        squares = (errors - self._steady) ** 2
+        off = (squares[..., 0] + squares[..., 1]) / 2.0
         self._square += min(told_s / self._seen_s, 1.0) * (off - self._square)
         self._believe()
 

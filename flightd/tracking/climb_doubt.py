@@ -8,6 +8,7 @@ range finder that sticks leaves the width of the lines to change alone: only bot
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from typing import NamedTuple
 
 _WINDOW_NS = 2_000_000_000
@@ -43,7 +44,7 @@ class ClimbDoubt:
         samples = self._samples
         while samples and stamp_ns - samples[0].stamp_ns > _WINDOW_NS:
             samples.popleft()
-        off_m = max((_off_m(new, old) for old in samples), default=0.0)
+        off_m = _most_off_m(new, samples)
         self.found = self.found or off_m > _OFF_M
         self._noticed = self.found or off_m > _NOTICED_M
         samples.append(new)
@@ -66,13 +67,18 @@ class ClimbDoubt:
         return ((new.climbed_m - old.climbed_m) - (new.range_m - old.range_m)) / span_s
 
 
-def _off_m(new: _Sample, old: _Sample) -> float:
-    """How far both heights say that the told climb is off, 0 where they do not agree on that."""
-    climbed_m = new.climbed_m - old.climbed_m
-    by_range_m, by_width_m = (new.range_m - old.range_m) - climbed_m, (new.width_m - old.width_m) - climbed_m
-    if by_range_m * by_width_m <= 0.0 or not _agree(new, old):
-        return 0.0
-    return min(abs(by_range_m), abs(by_width_m))
+def _most_off_m(new: _Sample, samples: Iterable[_Sample]) -> float:
+    """How far both heights say that the told climb is off, at most since any of these; 0 where they do not
+    agree on that."""
+    most_m = 0.0
+    for old in samples:
+        climbed_m = new.climbed_m - old.climbed_m
+        by_range_m = (new.range_m - old.range_m) - climbed_m
+        by_width_m = (new.width_m - old.width_m) - climbed_m
+        off_m = min(abs(by_range_m), abs(by_width_m))
+        if off_m > most_m and by_range_m * by_width_m > 0.0 and _agree(new, old):
+            most_m = off_m
+    return most_m
 
 
 def _agree(new: _Sample, old: _Sample) -> bool:

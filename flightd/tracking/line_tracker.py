@@ -234,9 +234,8 @@ class LineTracker:
         assert newest is not None
         held = self._filter
         yaw = wrap_pi(newest.yaw_rad + held.mean(PSI))
-        known_ns = now_ns - self._forget_ns  # a longer blindness is not bridged by prediction
-        since_ns = max(self._stamp_ns, known_ns)
-        vx, vy, moved_x, moved_y, ax, ay = self._carried(since_ns, now_ns, held.mean(VX), held.mean(VY))
+        known_ns = now_ns - self._forget_ns
+        vx, vy, moved_x, moved_y, ax, ay = self._carried_to(now_ns)
         return TrackSet(
             now_ns,
             self._lines_ns,
@@ -271,12 +270,12 @@ class LineTracker:
 
     def lead(self, now_ns: int, then_ns: int) -> Lead:
         """The motion from now to a moment to come, by what is assumed of the attitude until then."""
-        here = self.at(now_ns)
-        if here is None or then_ns <= now_ns:
+        if not self._headed or self._stamp_ns == 0 or then_ns <= now_ns:
             return NO_LEAD
         yaw_now, yaw_then = (self._attitude_at(stamp_ns).yaw_rad for stamp_ns in (now_ns, then_ns))
-        vx, vy, moved_x, moved_y = self._carried(now_ns, then_ns, here.vx_mps, here.vy_mps)[:4]
-        return Lead(moved_x, moved_y, vx - here.vx_mps, vy - here.vy_mps, wrap_pi(yaw_then - yaw_now))
+        vx, vy = self._carried_to(now_ns)[:2]
+        then_vx, then_vy, moved_x, moved_y = self._carried(now_ns, then_ns, vx, vy)[:4]
+        return Lead(moved_x, moved_y, then_vx - vx, then_vy - vy, wrap_pi(yaw_then - yaw_now))
 
     def unleant(self, now_ns: int) -> tuple[float, float]:
         """Acceleration along the grid axes (m/s2) that the told lean does not explain: push of the air and
@@ -286,6 +285,12 @@ class LineTracker:
         (ax, ay), ahead_s = self._accel(now_ns), (now_ns - self._stamp_ns) * 1e-9
         push = held.push_after(0, ahead_s), held.push_after(1, ahead_s)
         return ax - as_told[0] + push[0], ay - as_told[1] + push[1]
+
+    def _carried_to(self, now_ns: int) -> tuple[float, float, float, float, float, float]:
+        """The same from the newest frame on; a longer blindness than is remembered is not bridged by
+        prediction."""
+        since_ns = max(self._stamp_ns, now_ns - self._forget_ns)
+        return self._carried(since_ns, now_ns, self._filter.mean(VX), self._filter.mean(VY))
 
     def _carried(
         self, from_ns: int, to_ns: int, vx: float, vy: float

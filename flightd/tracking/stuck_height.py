@@ -41,7 +41,7 @@ class StuckHeight:
         self.found = False
         """Stays so until the end of the flight: what stuck once is not believed again."""
         self._samples: deque[_Sample] = deque()
-        self._least = self._most = _Sample(0, 0.0, 0.0, 0.0)
+        self._least_climbed_m = self._most_climbed_m = self._least_wanted_m = 0.0
         self._first_m: float | None = None
         self._last_ns: int | None = None
         self._climbed_m = 0.0
@@ -68,13 +68,14 @@ class StuckHeight:
         samples.append(new)
         while new.stamp_ns - samples[0].stamp_ns > _WANTED_NS:
             samples.popleft()
-        self._least, self._most = (_Sample(*map(of, zip(*samples, strict=True))) for of in (min, max))
+        climbed_m = [old.climbed_m for old in samples]
+        self._least_climbed_m, self._most_climbed_m = min(climbed_m), max(climbed_m)
+        self._least_wanted_m = min([old.wanted_m for old in samples])
 
     def _rose(self, new: _Sample) -> bool:
         """Whether there is anything that a height could contradict: cheap, and nearly always not."""
-        least, most = self._least, self._most
-        moved_m = max(new.climbed_m - least.climbed_m, most.climbed_m - new.climbed_m)
-        return moved_m > _MOVED_M or new.wanted_m - least.wanted_m > _WANTED_M
+        moved_m = max(new.climbed_m - self._least_climbed_m, self._most_climbed_m - new.climbed_m)
+        return moved_m > _MOVED_M or new.wanted_m - self._least_wanted_m > _WANTED_M
 
     def _unseen_m(self, old: _Sample) -> float:
         """What may have been climbed since then before the range finder measured anything."""

@@ -120,6 +120,8 @@ def _place(
     variance_px = (
         line.sigma_rho_px**2 - 2 * middle_px * line.rho_theta_cov + (middle_px * line.sigma_theta_rad) ** 2
     )
+    ends = [line.point_at(line.start_px), line.point_at(line.end_px)]
+    start, end = _on_floor(ends, inverse, centre, height_m, lever)
     return GroundLine(
         rho - tan_shift + lever_rho,
         theta,
@@ -128,10 +130,7 @@ def _place(
         math.hypot(math.sqrt(max(variance_px, 1e-4)) * metres_per_px, height_m * view.sigma_tilt_rad),
         math.hypot(line.sigma_theta_rad, view.sigma_tilt_rad * 0.5),
         line.width_px * metres_per_px,
-        (
-            _on_floor(line.point_at(line.start_px), inverse, centre, height_m, lever),
-            _on_floor(line.point_at(line.end_px), inverse, centre, height_m, lever),
-        ),
+        (start, end),
     )
 
 
@@ -190,20 +189,21 @@ def floor_points(points_px: Sequence[tuple[float, float]], view: FloorView) -> l
         return []
     homography = ground_homography(view.lens, view.mount, roll, pitch)
     inverse: Matrix = np.asarray(np.linalg.inv(homography), dtype=np.float64)
-    return [_on_floor(point, inverse, view.lens.centre_px, height_m, lever) for point in points_px]
+    return _on_floor(points_px, inverse, view.lens.centre_px, height_m, lever)
 
 
 def _on_floor(
-    point_px: tuple[float, float],
+    points_px: Sequence[tuple[float, float]],
     inverse: Matrix,
     centre: tuple[float, float],
     height_m: float,
     lever: Matrix,
-) -> tuple[float, float]:
-    """(forward, right) of a picture's point below a camera `height_m` up; far away near the horizon."""
-    x, y, w = (
-        float(row[0]) * (point_px[0] + centre[0]) + float(row[1]) * (point_px[1] + centre[1]) + float(row[2])
-        for row in inverse
-    )
-    scale = height_m / max(w, 0.1)
-    return x * scale + float(lever[0]), y * scale + float(lever[1])
+) -> list[tuple[float, float]]:
+    """(forward, right) of a picture's points below a camera `height_m` up; far away near the horizon."""
+    rows, forward_m, right_m = inverse.tolist(), float(lever[0]), float(lever[1])
+    points = []
+    for x_px, y_px in points_px:
+        x, y, w = (row[0] * (x_px + centre[0]) + row[1] * (y_px + centre[1]) + row[2] for row in rows)
+        scale = height_m / max(w, 0.1)
+        points.append((x * scale + forward_m, y * scale + right_m))
+    return points

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flightd.adapters.recorder.mcap_file import CHUNK_BYTES
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.core.errors import InputError
-from flightd.core.flight_order import FlightOrder
+from flightd.core.flight_order import ChosenPlan, FlightOrder
 from flightd.core.tick import TickOutput
 from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.core.tracks import TrackedLine, TrackSet
-from flightd.core.types import Demand, GridPose, Phase, Status, VehicleState
+from flightd.core.types import Demand, Event, EventLevel, GridPose, Phase, Status, VehicleState
 from flightd.replay.log import read_log
 from flightd.replay.log_skim import skim
 from flightd.replay.playback.flight import Leg, Moment, Playback
@@ -22,6 +23,7 @@ from flightd.replay.playback.legs import legs_of
 from flightd.replay.playback.loader import load_playback
 from flightd.replay.playback.pictures import find_pictures, read_picture
 from flightd.replay.playback.seen_floor import seen_floor
+from flightd.replay.report.loader import load_flight
 from flightd.site.site_file import parse_site
 from tests.replay.synthetic_flight import HEIGHT_M, NS, SITE_TOML, START_NS, write_flight
 
@@ -99,6 +101,33 @@ def test_a_glance_tells_what_reading_all_of_it_tells(log: Path, played: Playback
     assert glance.duration_s == pytest.approx(played.duration_s)
 
 
+def test_a_plan_that_was_chosen_before_the_start_is_what_the_flight_was_to_visit(tmp_path: Path) -> None:
+    log = tmp_path / "flight.mcap"
+    waits = Event(START_NS, EventLevel.INFO, "wait", "." * CHUNK_BYTES)
+    with McapRecorder(log, when_full=wait_for_disk) as recorder:
+        recorder.record(Topic.ORDER, START_NS, FlightOrder(pad="home"))
+        for chunk in range(12):  # a glance looks at the first of them, and for the status at the last
+            recorder.record(Topic.EVENT, START_NS + chunk * NS, waits)
+            if chunk in {5, 7}:
+                nodes = ("A2", "B1") if chunk == 7 else ("A1",)
+                recorder.record(Topic.PLAN, START_NS + chunk * NS, ChosenPlan(f"plan-{chunk}", nodes, (1,)))
+    assert skim(log).order == FlightOrder(nodes=("A2", "B1"), pad="home")
+    assert load_flight(log).nodes == {"A2", "B1"}
+    assert [leg.via for leg in load_playback(log).legs] == [("A2",), ("B1",)]
+
+
+def test_a_plan_taken_back_leaves_the_order(tmp_path: Path) -> None:
+    log = tmp_path / "flight.mcap"
+    with McapRecorder(log) as recorder:
+        recorder.record(Topic.ORDER, START_NS, FlightOrder(nodes=("A3",)))
+        recorder.record(Topic.PLAN, START_NS + 1, ChosenPlan("plan-1", ("A1",)))
+        recorder.record(Topic.PLAN, START_NS + 2, ChosenPlan(""))
+    order = skim(log).order
+    assert order is not None
+    assert order.nodes == ("A3",)
+    assert load_flight(log).nodes == {"A3"}
+
+
 @pytest.mark.parametrize("content", [b"", b"no flight log at all"])
 def test_what_is_no_log_is_refused_in_a_line(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "odd.mcap"
@@ -140,7 +169,7 @@ def test_the_way_leads_from_goal_to_goal_and_to_those_that_were_never_reached() 
         return Moment(t_s, Phase.FOLLOW, "", "", goal, 0, 3)
 
     moments = (moment(0.0, "A2"), moment(1.0, "A2"), moment(2.0, "A4"), moment(5.0, "B6"))
-    found = legs_of(SITE, moments, FlightOrder(nodes=("A2", "A4", "B6", "B5")))
+    found = legs_of(SITE, moments, ("A2", "A4", "B6", "B5"))
     assert [leg.t_s for leg in found] == [0.0, 2.0, 5.0, None]
     assert found[1].via == ("A3", "A4")
     assert found[2].via == ("A5", "A6", "B6")
@@ -149,8 +178,8 @@ def test_the_way_leads_from_goal_to_goal_and_to_those_that_were_never_reached() 
 
 def test_a_goal_that_the_map_does_not_have_is_named_all_the_same() -> None:
     moments = (Moment(0.0, Phase.FOLLOW, "", "", "A2", 0, 1), Moment(1.0, Phase.FOLLOW, "", "", "Z9", 0, 1))
-    assert legs_of(SITE, moments, None)[1].via == ("Z9",)
-    assert legs_of(None, moments, None)[1].via == ("Z9",)
+    assert legs_of(SITE, moments, ())[1].via == ("Z9",)
+    assert legs_of(None, moments, ())[1].via == ("Z9",)
 
 
 def decision(stamp_ns: int, seen_ns: int) -> TickOutput:

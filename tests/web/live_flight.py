@@ -167,6 +167,12 @@ class LiveFlight:
         return self._flight.airframe.x_m
 
     @property
+    def at_m(self) -> tuple[float, float, float]:
+        """Where it really is: along the aisles, to their right, above the floor."""
+        frame = self._flight.airframe
+        return frame.x_m, frame.y_m, frame.height_m
+
+    @property
     def quiet_s(self) -> float:
         """How long whoever attends has been silent."""
         return self._mailbox.quiet_s

@@ -18,6 +18,7 @@ from websockets.typing import Origin
 
 from flightd.adapters.ground_link.client import Address
 from flightd.ground.access.access import Access
+from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.hub import Viewer
 from flightd.ground.mqtt.fleet_link import FleetLink
@@ -107,6 +108,7 @@ async def served(
     send_buffer: int | None = None,
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
+    own_fleet: OwnFleet | None = None,
 ) -> AsyncIterator[Station]:
     """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`; its system
     takes so many bytes at once for a page (None: as many as it likes)."""
@@ -127,6 +129,7 @@ async def served(
                 viewers=viewers,
                 fleet=fleet,
                 store=store,
+                own_fleet=own_fleet,
             )
         )
         try:

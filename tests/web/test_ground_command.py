@@ -62,6 +62,8 @@ def ground(*words: str) -> tuple[int, str]:
         (["--listen", "8080"], "--listen 8080: is a port alone; give 127.0.0.1:8080"),
         (["--folder", "/etc/passwd"], "--folder /etc/passwd: is a file, no folder"),
         (["--listen", "0.0.0.0", "--foxglove", "127.0.0.1:0"], "--foxglove: everybody shall sign in, and"),
+        (["--fleet", "--mqtt", "mqtt://h", "--mqtt-orders"], "--fleet: the fleet's manager flies the drones"),
+        (["--fleet", "--mqtt-body", "round"], "--mqtt-body: 'round' is no size of a drone"),
         (["--foxglove", "0.0.0.0"], "--foxglove 0.0.0.0: reaches beyond this machine, and Foxglove"),
     ],
 )  # fmt: skip

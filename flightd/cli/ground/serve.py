@@ -20,6 +20,7 @@ from flightd.core.errors import InputError
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import Address
     from flightd.ground.access.access import Access
+    from flightd.ground.fleet.own_fleet import OwnFleet
     from flightd.ground.foxglove_view.live_server import FoxgloveServer
     from flightd.ground.ground_store.webhooks import Webhook
     from flightd.ground.mqtt.fleet_link import FleetLink
@@ -36,6 +37,7 @@ EXAMPLES = """Examples:
   flightd ground --foxglove 127.0.0.1          for Foxglove, too: it connects to ws://127.0.0.1:8765
   flightd ground --mqtt mqtt://broker --mqtt-version 3.0    for a fleet's manager, by VDA 5050
   flightd ground --mqtt mqtt://broker --mqtt-orders         the manager flies them, as long as no person does
+  flightd ground --drone a=drone-1 --drone b=drone-2 --fleet    the station flies them together
   flightd ground --folder out --store counts.db             and the ground store, for programs
   flightd ground --listen 0.0.0.0:8443 --tls-cert station.pem --tls-key station.key    for others, who sign in
 """
@@ -119,7 +121,9 @@ def ground(
     mqtt_version: Annotated[str, typer.Option(metavar="VERSION", help="Of VDA 5050: 2.1 or 3.0.")] = "2.1",
     mqtt_body: Annotated[
         str,
-        typer.Option(metavar="LxWxH", help="The drones' size with propellers, m, for their factsheets."),
+        typer.Option(
+            metavar="LxWxH", help="The drones' size with propellers, m: for factsheets and --fleet."
+        ),
     ] = "0.6x0.6x0.3",
     mqtt_orders: Annotated[
         bool,
@@ -131,9 +135,17 @@ def ground(
         float,
         typer.Option(
             metavar="SECONDS",
-            help="A drone that holds without an order, or without the broker, flies home after so long.",
+            help="A drone that holds without an order, or without the broker, flies home after so long;"
+            " with --fleet, too.",
         ),
     ] = 60.0,
+    fleet: Annotated[
+        bool,
+        typer.Option(
+            "--fleet",
+            help="The station flies the drones itself, together on one floor, as long as no person does.",
+        ),
+    ] = False,
     store: Annotated[
         str | None,
         typer.Option(
@@ -177,6 +189,12 @@ def ground(
 
     if mqtt_orders and mqtt is None:
         raise InputError("there is no broker", key="--mqtt-orders", remedy="give --mqtt mqtt://HOST")
+    if mqtt_orders and fleet:
+        raise InputError(
+            "the fleet's manager flies the drones, and a drone has one master",
+            key="--fleet",
+            remedy="leave out --fleet or --mqtt-orders",
+        )
     if not 5.0 <= mqtt_hold <= 3600.0:
         raise InputError("expected 5 to 3600 s", key=f"--mqtt-hold {mqtt_hold:g}")
     if folder is not None and not folder.is_dir():
@@ -193,7 +211,8 @@ def ground(
             viewer = stack.enter_context(_foxglove_server(foxglove, access.login, drones))
         at = "" if viewer is None else viewer.url
         hold_s = mqtt_hold if mqtt_orders else None
-        fleet = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones, access, hold_s)
+        link = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones, access, hold_s)
+        own_fleet = _own_fleet(mqtt_body, drones, access, mqtt_hold) if fleet else None
         viewers = () if viewer is None else (viewer,)
         hooks = _webhooks(webhook or (), store)
         kept = None if store is None else stack.enter_context(opened(store, evidence))
@@ -206,9 +225,10 @@ def ground(
             folder,
             viewers,
             others,
-            fleet,
+            link,
             kept,
             hooks,
+            own_fleet,
         )
     if ended_by is not None:
         print(f"flightd: the ground station was ended by {ended_by.name}", file=sys.stderr)
@@ -275,6 +295,17 @@ def _fleet_link(
 
     rules = None if hold_s is None else OrderRules(hold_s, write_down)
     return FleetLink([name for name, _ in drones], broker, of, measures, rules)
+
+
+def _own_fleet(body: str, drones: Sequence[tuple[str, Address]], access: Access, hold_s: float) -> OwnFleet:
+    from flightd.ground.fleet.own_fleet import TRAFFIC, OwnFleet
+    from flightd.ground.mqtt.broker_address import read_body
+    from flightd.ground.mqtt.managed_drone import OrderRules
+
+    def write_down(act: str, drone: str, outcome: str, text: str) -> None:
+        access.write_down(TRAFFIC, "", act, drone, outcome=outcome, text=text)
+
+    return OwnFleet([name for name, _ in drones], read_body(body), OrderRules(hold_s, write_down))
 
 
 def _say_where(foxglove: str, where: Listening) -> None:

@@ -3,7 +3,8 @@ what each may fly next.  Pure: a step from reports to commands."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,7 +12,7 @@ from flightd.fleet.traffic.distances import Distances
 from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action, Stop
 from flightd.fleet.traffic.traffic_control import TrafficControl
-from flightd.fleet.traffic.work_queue import TourTimes, WorkQueue
+from flightd.fleet.traffic.work_queue import MOST_OF_TOUR, TourTimes, WorkQueue
 
 _DOUBT_LASTS_MS: Final = 20_000
 SILENT_MS: Final = 90_000
@@ -63,9 +64,13 @@ class Commands:
 
 
 class Dispatcher:
-    """The fleet of one floor."""
+    """The fleet of one floor.  With `shares` no drone is given more than its part of what waits, for all that
+    could fly now."""
 
-    def __init__(self, control: TrafficControl, queue: WorkQueue, endurance: Endurance) -> None:
+    def __init__(
+        self, control: TrafficControl, queue: WorkQueue, endurance: Endurance, *, shares: bool = False
+    ) -> None:
+        self._shares = shares
         self.control = control
         self.queue = queue
         self._endurance = endurance
@@ -111,6 +116,39 @@ class Dispatcher:
         for node in nodes:
             self._shut.pop(node, None)
         self.queue.retry(nodes)
+
+    def withdraw(self, drone: str, place: int, air: Collection[int], now_ms: int) -> None:
+        """A drone is flown by somebody else, near `place` and anywhere in `air`: what it had to count is
+        given to others, who fly round it (`TrafficControl.roam`).  Again whenever its air has changed."""
+        before = self._near(drone)
+        self._held |= set(self.control.roam(drone, place, air, now_ms))
+        self._held.discard(drone)
+        self._avoided.discard(drone)
+        self._waits_since_ms.pop(drone, None)
+        if lost := self._tours.pop(drone, set()):
+            self._next_try_ms[drone] = now_ms + _RETRY_MS  # others first
+            self.queue.hand_back(lost)
+        self._settle_tours()
+        self._free(before - self._near(drone))
+
+    def readmit(self, drone: str, place: int, pad: int, now_ms: int) -> bool:
+        """It is the fleet's again, where it stands or hovers, and comes home to `pad`.  False, with nothing
+        changed, as long as somebody else is to come there."""
+        if not self.control.may_enter(drone, place):
+            return False
+        freed = self._near(drone)
+        self.control.enter(drone, place, ends=(pad,))
+        self._heard_ms[drone] = now_ms
+        if place != pad:
+            self._held |= set(self.control.replan([drone], now_ms))
+        self._free(freed)
+        return True
+
+    def _free(self, nodes: Collection[str]) -> None:
+        """Drones may come there again."""
+        if nodes:
+            self._tries.clear()
+            self.queue.retry(nodes)
 
     def _hear(self, report: DroneReport, now_ms: int) -> None:
         drone, course = report.drone, self.control.drones[report.drone]
@@ -243,22 +281,27 @@ class Dispatcher:
             self._replanned(held, now_ms)
 
     def _give_tours(self, now_ms: int) -> None:
-        for drone, course in self.control.drones.items():
-            idle = not course.ahead and not course.failed and course.doubt_m <= 0.0
-            if not idle or drone in self._held or self._charge.get(drone, 0.0) < self._endurance.starts_at:
-                continue
+        ready = [drone for drone in self.control.drones if self._may_begin(drone)]
+        for i, drone in enumerate(ready):
             due = self.queue.open and now_ms >= self._next_try_ms.get(drone, 0)
-            if due and not self._give_tour(drone, now_ms):
+            most = math.ceil(len(self.queue.open) / (len(ready) - i)) if self._shares else MOST_OF_TOUR
+            if due and not self._give_tour(drone, now_ms, min(most, MOST_OF_TOUR)):
                 self._next_try_ms[drone] = now_ms + _RETRY_MS
 
-    def _give_tour(self, drone: str, now_ms: int) -> bool:
+    def _may_begin(self, drone: str) -> bool:
+        """Whether a drone has nothing to do, and a battery to do something."""
+        course = self.control.drones[drone]
+        idle = not course.ahead and not course.failed and course.doubt_m <= 0.0
+        return idle and drone not in self._held and self._charge.get(drone, 0.0) >= self._endurance.starts_at
+
+    def _give_tour(self, drone: str, now_ms: int, most: int) -> bool:
         course = self.control.drones[drone]
         left_ms = self._endurance.left_ms(self._charge[drone])
         budget_ms = int(left_ms / (_SLOWER * (1 + _SPARE_FRAC)))
         busy = {self.queue.work(node).aisle for node in self.queue.given}
-        nodes = self.queue.tour(self._times(course.place), budget_ms, busy)
+        nodes = self.queue.tour(self._times(course.place, course.ends[0]), budget_ms, busy, most, drone)
         while nodes:
-            if not self.control.give(drone, [self._stop(node) for node in nodes], (course.place,), now_ms):
+            if not self.control.give(drone, [self._stop(node) for node in nodes], course.ends, now_ms):
                 self._refused(nodes)
                 nodes = nodes[: len(nodes) // 2]
                 continue
@@ -267,7 +310,7 @@ class Dispatcher:
                 self.queue.take(drone, nodes)
                 self._tours.setdefault(drone, set()).update(nodes)
                 return True
-            self.control.give(drone, (), (course.place,), now_ms)
+            self.control.give(drone, (), course.ends, now_ms)
             nodes = nodes[: len(nodes) * 3 // 4]
         return False
 
@@ -282,7 +325,7 @@ class Dispatcher:
         lanes = self.control.lanes
         return Stop(lanes.over(node), lanes.column_of[node], self.queue.work(node).dwell_ms)
 
-    def _times(self, pad: int) -> TourTimes:
+    def _times(self, place: int, pad: int) -> TourTimes:
         lanes, distances, net = self.control.lanes, self._distances, self.control.net
         stop_ms = net.launch_ms + net.stop_ms
         home = distances.to(pad)
@@ -291,6 +334,6 @@ class Dispatcher:
             return distances.to(lanes.over(b))[lanes.over(a)] + stop_ms
 
         def out_ms(node: str) -> int:
-            return distances.to(lanes.over(node))[pad] + 4 * stop_ms
+            return distances.to(lanes.over(node))[place] + 4 * stop_ms
 
         return TourTimes(out_ms, between_ms, lambda node: home[lanes.over(node)] + 4 * stop_ms)

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
 from flightd.fleet.traffic.action_graph import ActionGraph, Course
 from flightd.fleet.traffic.cells import CellSize, Conflicts, conflicts_of, within
+from flightd.fleet.traffic.drone_course import DroneCourse
 from flightd.fleet.traffic.lanes import LaneGraph
 from flightd.fleet.traffic.motions import NEVER, Act, MotionNet, at_rest
 from flightd.fleet.traffic.pibt import Pushed, plan_by_pushing
@@ -29,46 +29,6 @@ HORIZON_MS: Final = 12_000
 """Actions are released until those that are not done last so long: what a drone flies without a link."""
 LATE_MS: Final = 90_000
 """Who does not get on is expected to be so late."""
-
-
-@dataclass(slots=True)
-class DroneCourse:
-    """One drone: `done` of its actions are done, `released` are released, both counted over its whole life;
-    `ahead` are those that are not done.  `stops` are left to be visited."""
-
-    place: int
-    quarter: int = 0
-    done: int = 0
-    released: int = 0
-    since_ms: int = 0
-    ahead: list[Action] = field(default_factory=list)
-    stops: tuple[Stop, ...] = ()
-    ends: tuple[int, ...] = ()
-    wreck: frozenset[int] = frozenset()
-    doubt_m: float = 0.0
-    doubt_since_ms: int = 0
-    late_ms: int = 0
-    priority: float = 0.0
-
-    @property
-    def failed(self) -> bool:
-        """It does not fly any more; `wreck` is where it may be."""
-        return bool(self.wreck)
-
-    @property
-    def base(self) -> list[Action]:
-        """Released and not done."""
-        return self.ahead[: self.released - self.done]
-
-    @property
-    def tail(self) -> list[Action]:
-        """Not released."""
-        return self.ahead[self.released - self.done :]
-
-    @property
-    def air(self) -> list[int]:
-        """Every resource on which the drone may be now, for all that is known."""
-        return [self.place, *(action.resource for action in self.base)]
 
 
 class TrafficControl:
@@ -86,10 +46,37 @@ class TrafficControl:
         self._graph = ActionGraph({}, self.conflicts)
         self.replans = 0
 
-    def enter(self, drone: str, place: int, quarter: int = 0) -> None:
-        """A drone that stands on a vertex of its own, usually a pad."""
-        self.drones[drone] = DroneCourse(place, quarter, ends=(place,))
+    def enter(self, drone: str, place: int, quarter: int = 0, ends: Sequence[int] = ()) -> None:
+        """A drone that stands, or hovers, on a vertex of its own, usually a pad; `ends` are those on which it
+        may stay for good, that vertex where none is named."""
+        self.drones[drone] = DroneCourse(place, quarter, ends=tuple(ends) or (place,))
+        self._avoided.pop(drone, None)
         self._rebuild()
+
+    def may_enter(self, drone: str, place: int) -> bool:
+        """Whether nobody else is, or is to come, where the drone would stand."""
+        near = set(self.conflicts[place])
+        for other, course in self.drones.items():
+            taken = course.wreck or {course.place, *(a.resource for a in course.ahead), *_ends_of(course)}
+            if other != drone and not near.isdisjoint(taken):
+                return False
+        return True
+
+    def roam(self, drone: str, place: int, air: Collection[int], now_ms: int) -> tuple[str, ...]:
+        """A drone flies by somebody else's will, is near `place` and may be anywhere in `air`: others are
+        planned round that, and who was released into it stands still, until the drone enters anew.  Returns
+        those for which there is no way."""
+        course = self.drones[drone]
+        projected = self.projected(now_ms)
+        before = self.avoided(drone) if course.roams else frozenset()
+        course.place, course.wreck, course.roams = place, frozenset((place, *air)), True
+        course.ahead, course.stops, course.doubt_m, course.released = [], (), 0.0, course.done
+        zone = within(self.lanes, tuple(course.wreck), self._cell.separation_m, self._cell.upright_m)
+        self._avoided[drone] = zone
+        if zone <= before:
+            return ()
+        projected[drone] = []
+        return self._replan_met(projected, zone, now_ms)
 
     def done(self, drone: str, number: int, now_ms: int) -> list[int]:
         """The first `number` actions of a drone's life are done.  Returns the vertices at which it
@@ -136,8 +123,12 @@ class TrafficControl:
         return all(self.drones[other].done > its for other, its in self._graph.waits_for((drone, number)))
 
     def _zones(self) -> dict[str, frozenset[int]]:
-        """The grown cells of the drones whose position is doubted."""
-        return {drone: self._zone(course) for drone, course in self.drones.items() if course.doubt_m > 0.0}
+        """The grown cells of the drones whose position is doubted, and the air of those that roam."""
+        return {
+            drone: self._avoided[drone] if course.roams else self._zone(course)
+            for drone, course in self.drones.items()
+            if course.roams or course.doubt_m > 0.0
+        }
 
     def _zone(self, course: DroneCourse) -> frozenset[int]:
         reach_m = self._cell.separation_m + course.doubt_m
@@ -173,7 +164,8 @@ class TrafficControl:
         }
         done = {drone: course.done for drone, course in self.drones.items()}
         late_ms = {drone: course.late_ms for drone, course in self.drones.items()}
-        return self._graph.projected(now_ms, done, begun, late_ms)
+        projected = self._graph.projected(now_ms, done, begun, late_ms)
+        return {drone: projected.get(drone, []) for drone in self.drones}
 
     def give(self, drone: str, stops: Sequence[Stop], ends: Sequence[int], now_ms: int) -> bool:
         """Plan a drone's stops, and an end to stay on, round all others.  False, and nothing has changed,
@@ -311,6 +303,7 @@ class TrafficControl:
         courses = {
             drone: Course(course.place, course.done, tuple(course.ahead))
             for drone, course in self.drones.items()
+            if not course.roams
         }
         self._graph = ActionGraph(courses, self.conflicts)
 
@@ -412,3 +405,7 @@ class TrafficControl:
             for number in range(course.released, course.done + len(course.ahead))
             for other, its in self._graph.waits_for((drone, number))
         )
+
+
+def _ends_of(course: DroneCourse) -> tuple[int, ...]:
+    return (course.ahead[-1].vertex,) if course.ahead else ()

@@ -9,6 +9,8 @@ from typing import Final
 
 _VALUE_SPAN_MS: Final = 3_600_000
 """A class of value outweighs the way to it up to so long."""
+MOST_OF_TOUR: Final = 40
+"""A drone is not given more nodes at a time."""
 
 
 class Value(IntEnum):
@@ -23,7 +25,7 @@ class Value(IntEnum):
 @dataclass(frozen=True, slots=True)
 class NodeWork:
     """The places that are counted from one node, and how long that takes.  Of equal `value` the one with the
-    greater `age_s` goes first."""
+    greater `age_s` goes first.  Only that `drone` does it, if one is named."""
 
     node: str
     aisle: str
@@ -32,6 +34,7 @@ class NodeWork:
     dwell_ms: int
     value: Value = Value.NEVER_COUNTED
     age_s: float = 0.0
+    drone: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +50,7 @@ class WorkQueue:
     """Nodes that wait, are given to a drone, are done, or cannot be done for a reason."""
 
     def __init__(self, work: Iterable[NodeWork]) -> None:
-        self._work: Mapping[str, NodeWork] = {each.node: each for each in work}
+        self._work: dict[str, NodeWork] = {each.node: each for each in work}
         self._open: dict[str, None] = dict.fromkeys(self._work)
         self._given: dict[str, str] = {}
         self.done: list[str] = []
@@ -66,6 +69,16 @@ class WorkQueue:
     def given(self) -> Mapping[str, str]:
         """Node to drone."""
         return self._given
+
+    def ask(self, work: Iterable[NodeWork]) -> None:
+        """More of it, or again; what a drone has already stays with it."""
+        for each in work:
+            self._work[each.node] = each
+            self.reasons.pop(each.node, None)
+            if each.node in self.done:
+                self.done.remove(each.node)
+            if each.node not in self._given:
+                self._open[each.node] = None
 
     def finish(self, node: str) -> None:
         """It is counted."""
@@ -98,14 +111,21 @@ class WorkQueue:
             self._given[node] = drone
 
     def tour(
-        self, times: TourTimes, budget_ms: int, busy_aisles: Collection[str] = (), most: int = 40
+        self,
+        times: TourTimes,
+        budget_ms: int,
+        busy_aisles: Collection[str] = (),
+        most: int = MOST_OF_TOUR,
+        drone: str = "",
     ) -> tuple[str, ...]:
-        """The nodes of one tour within a budget: first the most valuable aisle that nobody flies in, from its
-        nearer end on, then what lies nearest.  Empty where nothing fits."""
+        """The nodes of one tour of a drone within a budget: first the most valuable aisle that nobody flies
+        in, or that has work for this drone alone, from its nearer end on, then what lies nearest.  Empty
+        where nothing fits."""
         aisles: dict[str, list[NodeWork]] = {}
         for node in self._open:
             work = self._work[node]
-            if work.aisle not in busy_aisles:
+            named = bool(drone) and work.drone == drone
+            if named or (not work.drone and work.aisle not in busy_aisles):
                 aisles.setdefault(work.aisle, []).append(work)
         ranked = sorted(aisles.values(), key=lambda works: self._rank(works, times))
         nodes: list[str] = []

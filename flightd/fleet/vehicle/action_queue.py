@@ -40,6 +40,11 @@ class ActionQueue:
         """Whether all are finished or failed."""
         return all(one.status.is_over for one in self._all.values())
 
+    def is_over_of(self, action_id: str) -> bool:
+        """Whether one is finished or failed, or not known."""
+        tracked = self._all.get(action_id)
+        return tracked is None or tracked.status.is_over
+
     @property
     def runs(self) -> bool:
         """Whether one is going on."""

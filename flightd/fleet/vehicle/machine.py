@@ -136,6 +136,20 @@ class Vehicle:
         return self._last_node[0]
 
     @property
+    def last_sequence(self) -> int:
+        """The sequence id of that node in the order."""
+        return self._last_node[1]
+
+    @property
+    def ahead(self) -> tuple[str, ...]:
+        """The nodes that the drone was told last to fly along, as far as it has not reached them."""
+        return tuple(stop.node for stop in self._commanded)
+
+    def is_over(self, action_id: str) -> bool:
+        """Whether an action of the order goes on no more, or is not known."""
+        return self._actions.is_over_of(action_id)
+
+    @property
     def is_idle(self) -> bool:
         """Whether no order is left to be flown or done."""
         return self._idle

@@ -67,6 +67,9 @@ RULES: Mapping[str, Rule] = {
     "WEBSOCKET /live": Rule(Role.VIEWER, Line.OWN),
     "POST /drones/{drone}/acts": Rule(Role.VIEWER, Line.OWN),
     "POST /drones/{drone}/manager": _ACTS,
+    "GET /api/fleet": _LOOKS,
+    "POST /api/fleet/tour": _ACTS,
+    "POST /api/fleet/stop": Rule(Role.VIEWER, Line.OWN),  # as STOP to one drone
     "GET /api/stock": _LOOKS,
     "GET /api/stock/places": _LOOKS,
     "GET /api/stock/place": _LOOKS,

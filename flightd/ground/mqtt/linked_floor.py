@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 
-from flightd.adapters.ground_link.messages.floor import FloorLine, FloorNode, FloorStatus
+from flightd.adapters.ground_link.messages.floor import FloorLine, FloorNode, FloorPad, FloorStatus
 from flightd.fleet.vehicle.floor import Floor
 from flightd.site.site import Side
 from flightd.site.ways import Ways
@@ -22,7 +22,12 @@ def floor_of_link(floor: FloorStatus) -> Floor:
     for rack in floor.racks:
         sides.setdefault(rack.aisle, set()).add(Side(rack.side))
     shelves = {node.id: frozenset(sides.get(node.aisle, ())) for node in floor.nodes}
-    return Floor(floor.name, frozenset(shelves), frozenset(_open_ways(floor)), shelves)
+    return Floor(floor.name, frozenset(shelves), frozenset(open_ways(floor)), shelves)
+
+
+def node_of_pad(floor: FloorStatus, pad: FloorPad) -> str:
+    """The node beside which a pad lies."""
+    return min(floor.nodes, key=lambda node: math.dist((node.x_m, node.y_m), (pad.x_m, pad.y_m))).id
 
 
 class WaysHome:
@@ -30,9 +35,8 @@ class WaysHome:
 
     def __init__(self, floor: FloorStatus) -> None:
         self._at = {node.id: (node.x_m, node.y_m) for node in floor.nodes}
-        pads = [pad for pad in floor.pads if pad.charge]
-        landed = [min(self._at, key=lambda node: math.dist(self._at[node], (p.x_m, p.y_m))) for p in pads]
-        back = [(b, a, self._apart_m(a, b)) for a, b in _open_ways(floor)]
+        landed = [node_of_pad(floor, pad) for pad in floor.pads if pad.charge]
+        back = [(b, a, self._apart_m(a, b)) for a, b in open_ways(floor)]
         ways = Ways([_PADS, *self._at], [*((_PADS, node, 0.0) for node in landed), *back])
         self._home_m = {_PADS: 0.0}
         for node, before in ways.reach(_PADS).items():
@@ -53,7 +57,7 @@ class WaysHome:
         return math.dist(self._at[a], self._at[b])
 
 
-def _open_ways(floor: FloorStatus) -> set[tuple[str, str]]:
+def open_ways(floor: FloorStatus) -> set[tuple[str, str]]:
     """From each node to the next on its painted lines, but for what is closed or one way."""
     found: set[tuple[str, str]] = set()
     for line in floor.lines:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Final
 
+from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import FlightdError, RunError
 from flightd.core.types import CommandKind, EventLevel, Phase
@@ -95,6 +96,13 @@ class ManagedDrone:
         self.at_broker = False
         """Somebody may hear what is said."""
         self.on_taken: Callable[[bool], None] = lambda _taken: None
+        self.on_decided: Callable[[Decided], None] = lambda _decided: None
+        self.flies = self.lands = False
+        """As `Wish`: whoever gives the orders sets them."""
+        self.has_more = False
+        """A drone that holds without an order waits for one that will come."""
+        self.is_automatic = False
+        """The manager may fly it, by what it told last."""
         self._messages: dict[type[Header], Header] = {}
         self._welcome: dict[str, Any] | None = None
         self._ways: WaysHome | None = None
@@ -130,6 +138,26 @@ class ManagedDrone:
         """The station hears the drone."""
         return self._heard
 
+    @property
+    def is_taken(self) -> bool:
+        """A person commands it."""
+        return self._taken
+
+    @property
+    def status(self) -> StatusReport | None:
+        """What it told last."""
+        return self._status
+
+    @property
+    def standing(self) -> Standing | None:
+        """What it told of itself before its start."""
+        return self._standing
+
+    @property
+    def floor(self) -> FloorStatus | None:
+        """The map that it flies by."""
+        return None if self._welcome is None else self._welcome["floor"]
+
     def tell(self, topic: str, value: Any) -> None:
         """What the hub says of the drone."""
         match topic:
@@ -163,7 +191,7 @@ class ManagedDrone:
         self.vehicle.change_floor(floor_of_link(welcome["floor"]))
         self._ways = WaysHome(welcome["floor"])
         self._status = self._standing = self._event_seq = None
-        self._is_new = True
+        self._is_new, self.is_automatic = True, False
         self._asked_at_s = -_ASK_AGAIN_S
         self._return = SafeReturn()
         self._sent.clear()
@@ -228,9 +256,9 @@ class ManagedDrone:
         seen = situation_of(status, floor, mode, last, stands_on, self._troubles())
         for one in self.vehicle.step(self.now(), [seen, *arrived, *asked]):
             self._take_output(one, status)
-        if mode is not OperatingMode.AUTOMATIC:
-            self._ahead = []  # the order is over with it
-        elif self._link is not None:
+        self._ahead = list(self.vehicle.ahead)
+        self.is_automatic = mode is OperatingMode.AUTOMATIC
+        if self.is_automatic and self._link is not None:
             self._go_on(status, now_s, tasks, self._link)
 
     def _mode(self, status: StatusReport) -> OperatingMode:
@@ -250,14 +278,12 @@ class ManagedDrone:
 
     @property
     def _wish(self) -> Wish:
-        return Wish(tuple(self._ahead), self.vehicle.last_node, self._counts.go_on)
+        return Wish(tuple(self._ahead), self.vehicle.last_node, self._counts.go_on, self.flies, self.lands)
 
     def _take_output(self, one: Output, status: StatusReport) -> None:
         match one:
-            case Fly(stops):
-                self._ahead = [stop.node for stop in stops]
-            case Hold():
-                self._ahead = []
+            case Fly() | Hold():
+                pass  # what is ahead is known by the machine
             case Begin(action):
                 failed = self._counts.begin(action, self.vehicle.last_node, status, self._standing)
                 self._asked.extend([failed] if failed is not None else [])
@@ -272,6 +298,7 @@ class ManagedDrone:
 
     def _decided(self, one: Decided) -> None:
         self._trouble = None
+        self.on_decided(one)
         if isinstance(one.about, Order):
             if one.refusal is None:
                 self._order = one.about
@@ -326,7 +353,7 @@ class ManagedDrone:
     def _homeward(self, status: StatusReport, now_s: float) -> Next:
         """Home, for a drone that holds in the air and has nothing to wait for."""
         wish = self._wish
-        needless = self.vehicle.is_idle or not self.at_broker
+        needless = (self.vehicle.is_idle and not self.has_more) or not self.at_broker
         if status.phase is not Phase.HOLD or wish.ahead or wish.works or not needless:
             self._rests_since_s = None
             return None

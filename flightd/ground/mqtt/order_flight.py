@@ -25,11 +25,14 @@ WAITS = frozenset({Phase.PREFLIGHT, Phase.ARMING})
 @dataclass(frozen=True, slots=True)
 class Wish:
     """What an order wants by now: the nodes to be flown along, none to stay; the node that the drone is at or
-    left last; whether something goes on there that a pause would interrupt."""
+    left last; whether something goes on there that a pause would interrupt; whether it is to be in the air,
+    if only over its pad's node; whether it may come down there."""
 
     ahead: tuple[str, ...]
     last: str
     works: bool = False
+    flies: bool = False
+    lands: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +76,7 @@ def next_act(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, ..
 
 
 def _on_ground(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, ...]] | None) -> Next:
-    target = each_once(wish.ahead or ((wish.last,) if wish.works else ()))
+    target = each_once(wish.ahead or ((wish.last,) if wish.works or wish.flies else ()))
     if not target:
         ours = planned is not None and status.plan == planned[0]
         return CommandNext(CommandKind.PAUSE) if ours and CommandKind.PAUSE in status.possible else None
@@ -86,6 +89,8 @@ def _on_ground(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, 
 
 def _in_air(status: StatusReport, wish: Wish) -> Next:
     goal, following = status.way[0], status.way[1] if len(status.way) > 2 else ""  # the last one is its pad
+    if wish.lands and not wish.ahead and {*status.way} == {wish.last}:
+        return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD else None
     if goal == wish.last:
         wanted = wish.ahead[0] if wish.ahead else goal
     elif goal in wish.ahead:

@@ -191,7 +191,7 @@ class ReferenceGenerator:
             return 0.0, Demand.FLY
         rate = self._touchdown.rate_mps(s, _target(s, task))
         if rate > 0.0 and not self._steers:  # what drifts unseen should not do so for long
-            rate = self._blind.rate_mps(s.height_m)
+            rate = self._blind.rate_mps(s.believed_height_m)
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         self._sinks = rate > 0.0
         deaf = s.telemetry_age_s > p.telemetry_land_s

@@ -58,6 +58,8 @@ class Standstill:
         self._climbed_m = 0.0
         self._held: Attitude | None = None
         self._kept: tuple[int, float] | None = None
+        self._doubted = False
+        """In this landing the lines contradicted the range finder: nearer to the floor they no longer can."""
         self.touches = False
         """It stands on something: who stands does not follow a lean, and the position loop would ask for more
         and more of it."""
@@ -71,12 +73,14 @@ class Standstill:
         """A landing begins."""
         self._since = self._held = self._kept = None
         self._blocked_s, self._sank_s, self.touches = 0.0, 0.0, False
+        self._doubted = False
 
     def step(self, s: MissionInputs, *, sinks: bool) -> float:
         """Seconds; 0 while it moves, is higher, or is not heard.  `sinks`: it is commanded to."""
         climb_mps = math.nan if s.vehicle is None else s.vehicle.climb_mps
-        if s.warnings.height_stuck:
-            s = replace(s, height_m=math.nan)  # what sticks may stick at what is read on the floor
+        self._doubted |= s.warnings.height_doubted
+        if s.warnings.height_stuck or self._doubted:
+            s = replace(s, height_m=math.nan)  # what is wrong may be what is read on the floor
         if not sinks:
             self._sank_s = 0.0  # it has stopped at some height, to aim
         elif climb_mps < -_STILL_MPS:
@@ -160,8 +164,8 @@ def _turned_rad(a: Attitude, b: Attitude) -> float:
 
 
 class ReckonedHeight:
-    """How high above the floor the drone is at least: as measured, and from the last measurement on by the
-    climb that the vehicle tells.  Call `step` at each tick in the air."""
+    """How high above the floor the drone is at least: as measured, by the lines where they contradict that,
+    and from then on by the climb that the vehicle tells.  Call `step` at each tick in the air."""
 
     def __init__(self) -> None:
         self._height_m = math.nan
@@ -173,7 +177,7 @@ class ReckonedHeight:
         if s.warnings.height_stuck:
             self._height_m = math.nan  # nobody knows since when
         elif not math.isnan(s.height_m):
-            self._height_m, self._moved_m = s.height_m, None
+            self._height_m, self._moved_m = s.believed_height_m, None
         else:
             self._height_m += climb_mps * s.dt_s
             self._moved_m = (self._moved_m or 0.0) + abs(climb_mps) * s.dt_s

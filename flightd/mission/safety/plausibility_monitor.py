@@ -78,6 +78,7 @@ class PlausibilityMonitor:
             blank_s=frames.blank_s(now_ns),
             heading_error_rad=tracker.heading_error_rad,
             height_doubted=self._doubt,
+            height_error_m=tracker.height_off_m,
             height_stuck=height_stuck,
             climb_wrong=climb is not None and climb.found,
             climb_error_mps=0.0 if climb is None else climb.error_mps(now_ns),

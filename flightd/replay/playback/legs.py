@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flightd.core.flight_order import FlightOrder
 from flightd.replay.playback.flight import Leg, Moment
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
 
 
-def legs_of(site: Site | None, moments: Sequence[Moment], order: FlightOrder | None) -> tuple[Leg, ...]:
-    """The goals in the order in which the mission named them, then those that it never came to."""
+def legs_of(site: Site | None, moments: Sequence[Moment], nodes: Sequence[str]) -> tuple[Leg, ...]:
+    """The goals in the order in which the mission named them, then those of the `nodes` to visit that it
+    never came to."""
     goals: list[tuple[float | None, str]] = []
     for moment in moments:
         if moment.goal and (not goals or goals[-1][1] != moment.goal):
             goals.append((moment.t_s, moment.goal))
-    if order is not None and order.nodes:
-        named = {node for _, node in goals}
-        goals += [(None, node) for node in order.nodes if node not in named]
+    named = {node for _, node in goals}
+    goals += [(None, node) for node in nodes if node not in named]
     legs, before = [], ""
     for t_s, goal in goals:
         legs.append(Leg(t_s, _way(site, before, goal)))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.errors import InputError
-from flightd.core.flight_order import FlightOrder
+from flightd.core.flight_order import ChosenPlan, FlightOrder
 from flightd.core.topics import RETAINED, Document, Topic
 from flightd.core.types import AttitudeSetpoint, Event, GridPose, Status, VehicleState
 from flightd.replay.log import Entry, LogReader
@@ -38,8 +38,8 @@ from flightd.site.site import Site
 
 _TOPICS = frozenset(
     {
-        Topic.POSE, Topic.VEHICLE, Topic.SETPOINT, Topic.STATUS, Topic.EVENT, Topic.MAP, Topic.ORDER,
-        Topic.CONFIG,
+        Topic.POSE, Topic.VEHICLE, Topic.SETPOINT, Topic.STATUS, Topic.EVENT, Topic.MAP, Topic.CONFIG,
+        Topic.ORDER, Topic.PLAN,
     }
 )  # fmt: skip
 _FINEST_S = 0.01
@@ -65,7 +65,8 @@ class _Gathered:
     events: list[Event] = field(default_factory=list)
     maps: list[Document] = field(default_factory=list)
     configs: list[Document] = field(default_factory=list)
-    order: FlightOrder | None = None
+    nodes: tuple[str, ...] = ()
+    chosen: tuple[str, ...] = ()
     first_ns: int | None = None
     last_ns: int = 0
 
@@ -88,7 +89,9 @@ class _Gathered:
                 kept = self.maps if entry.topic == Topic.MAP else self.configs
                 kept[:] = [entry.message]
             case FlightOrder():
-                self.order = entry.message
+                self.nodes = entry.message.nodes
+            case ChosenPlan():
+                self.chosen = entry.message.nodes
 
     def _take_status(self, status: Status) -> None:
         add_status(self.statuses, status)
@@ -114,7 +117,7 @@ def load_playback(path: Path) -> Playback:
     vehicle, setpoints, statuses = (
         table.column_set(start_ns) for table in (gathered.vehicle, gathered.setpoints, gathered.statuses)
     )
-    legs = legs_of(site, moments, gathered.order)
+    legs = legs_of(site, moments, gathered.chosen or gathered.nodes)
     found = quantities(site, moments, legs, poses, truth, vehicle, setpoints, statuses)
     stretches = min(max(math.ceil(duration_s / _FINEST_S), 1), _MOST_STRETCHES)
     grid = TimeGrid(0.0, duration_s, stretches)

@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from flightd.core.errors import InputError
-from flightd.core.flight_order import FlightOrder
+from flightd.core.flight_order import ChosenPlan, FlightOrder
 from flightd.core.topics import FOR_PEOPLE, RETAINED, Document, Topic
 from flightd.core.tracks import last_known
 from flightd.core.types import (
@@ -103,6 +103,8 @@ def _summary(path: Path) -> Summary:
 def _ordered_nodes(log: FlightLog) -> frozenset[str]:
     """The nodes that the flight was to visit, empty where that is all of them or nobody knows.  A log without
     an order is of a time when the configuration was recorded with the order laid over it."""
+    if (plans := log.messages(ChosenPlan)) and plans[-1].nodes:
+        return frozenset(plans[-1].nodes)
     if orders := log.messages(FlightOrder):
         return frozenset(orders[-1].nodes)
     for document in reversed(log.messages(Document, Topic.CONFIG)):

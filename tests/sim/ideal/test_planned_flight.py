@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from flightd.config.schema import load_config
+from flightd.core.flight_order import ChosenPlan
 from flightd.core.planned_flight import PlannedFlight
+from flightd.core.topics import Topic
 from flightd.core.types import Command, CommandKind, Phase
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
@@ -23,6 +25,7 @@ def flown(*nodes: str, levels: tuple[int, ...] = ()) -> tuple[Flown, PlannedFlig
     flight = IdealFlight(SITE, CONFIG, front=IdealFront(SITE, SIGHT, stock))
     mission = flight.pilot.mission
     said: list[PlannedFlight] = []
+    kept: list[object] = []
 
     def order(_phase: Phase, _now_ns: int) -> None:
         if not said and CommandKind.START in mission.possible_commands:
@@ -31,7 +34,10 @@ def flown(*nodes: str, levels: tuple[int, ...] = ()) -> tuple[Flown, PlannedFlig
             flight.commands += [plan, Command("start-001", CommandKind.START, plan="plan-0001")]
 
     flight.on_tick = order
-    return flight.fly(), said[0]
+    flight.on_record = lambda topic, _ns, message: kept.append(message) if topic == Topic.PLAN else None
+    done = flight.fly()
+    assert kept == [ChosenPlan("plan-0001", nodes, levels)]
+    return done, said[0]
 
 
 def test_it_counts_the_chosen_level_of_the_chosen_nodes_in_about_the_time_that_was_said() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from flightd.config.mission import MissionConfig
 from flightd.core.types import Attitude, AttitudeSetpoint, LandedState, VehicleState
-from flightd.mission.flight.touchdown import Standstill
+from flightd.mission.flight.touchdown import ReckonedHeight, Standstill
 from flightd.mission.guidance import MissionInputs, Warnings
 
 TICK_NS = 20_000_000
@@ -64,6 +64,30 @@ def test_one_that_the_floor_keeps_at_its_height_stands_though_it_tells_a_climb()
     for tick in range(100, 130):
         stands.step(told(tick, 0.1, -0.2), sinks=True)
     assert stands.touches
+
+
+def test_a_height_that_the_lines_contradicted_in_this_landing_tells_nothing_of_the_floor() -> None:
+    """Told to be at the floor already, it sinks on from a metre above it, out of sight of the lines."""
+    stands = Standstill(PARAMS)
+    stands.begin()
+    for tick in range(160):
+        height_m, climb_mps = (0.3, 0.02) if tick < 30 else (max(0.3 - 0.004 * (tick - 30), 0.1), -0.2)
+        warnings = Warnings(height_doubted=tick < 60, height_error_m=-0.7)
+        stands.step(replace(told(tick, height_m, climb_mps), warnings=warnings), sinks=True)
+        assert not stands.touches
+    for tick in range(160, 190):
+        stands.step(told(tick, 0.1, 0.0), sinks=True)
+    assert stands.touches
+
+
+def test_the_height_to_slow_down_at_is_that_of_the_lines_where_they_contradict_the_told_one() -> None:
+    reckoned, wrong = ReckonedHeight(), Warnings(height_doubted=True, height_error_m=-0.7)
+    reckoned.step(told(0, 1.0, -0.35))
+    assert reckoned.least_m == 1.0
+    reckoned.step(replace(told(1, 0.29, -0.35), warnings=wrong))
+    assert reckoned.least_m == pytest.approx(0.99)
+    reckoned.step(replace(told(2, 0.29, -0.35), warnings=replace(wrong, height_doubted=False)))
+    assert reckoned.least_m == 0.29, "an error that is not sure is none"
 
 
 def test_a_range_finder_that_sticks_at_the_floor_makes_no_hover_a_standstill() -> None:

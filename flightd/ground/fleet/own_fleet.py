@@ -1,0 +1,169 @@
+"""The fleet that the station flies itself: it keeps each drone's vehicle side, and steps traffic control over
+them once all have told where they stand."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import uuid
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Any, Final
+
+from flightd.adapters.ground_link.messages.floor import FloorStatus
+from flightd.core.errors import FlightdError, InputError, UnavailableError
+from flightd.core.types import CommandKind
+from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.vehicle.drone_factsheet import Measures
+from flightd.ground.access.roles import Identity, Role
+from flightd.ground.fleet.base_orders import VERSION
+from flightd.ground.fleet.fleet_drone import FleetDrone
+from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor
+from flightd.ground.fleet.station_traffic import StationTraffic, pace_of
+from flightd.ground.hub import Hub
+from flightd.ground.messages import Act, LinkPicture, PictureKey
+from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
+from flightd.ground.mqtt.safe_return import Standing
+
+TRAFFIC: Final = Identity("fleet traffic", Role.OPERATOR, "local")
+"""Whose orders they are, in the audit."""
+_LOG = logging.getLogger(__name__)
+_STEP_S: Final = 0.25
+_AGAIN_S: Final = 5.0
+
+
+class OwnFleet:
+    """A viewer of the hub (`hub.Viewer`) and the manager of its drones (`manager_routes.Managers`); `run` is
+    a task beside the hub's, `leave` ends it with everybody holding where he is."""
+
+    def __init__(self, drones: Iterable[str], measures: Measures, rules: OrderRules) -> None:
+        self._cell = CellSize(body_m=max(measures.length_m, measures.width_m), upright_m=WHOLE_AIR_M)
+        self._drones = {name: ManagedDrone(name, VERSION, measures, rules) for name in drones}
+        for drone in self._drones.values():
+            drone.at_broker = True  # who gives the orders is always there
+        self._traffic: StationTraffic | None = None
+        self._trouble = ""
+        self._hub: Hub | None = None
+
+    async def run(self, hub: Hub) -> None:
+        """Fly them until cancelled."""
+        self._hub = hub
+        async with asyncio.TaskGroup() as tasks:
+            for name, drone in self._drones.items():
+                drone.on_taken = partial(_tell_page, hub, name)
+                _tell_page(hub, name, False)
+                tasks.create_task(drone.run(hub.drones[name]), name=f"{name} as a vehicle")
+            tasks.create_task(self._control(), name="traffic")
+
+    async def leave(self) -> None:
+        """Have everybody who flies by traffic hold where he is.  Call it when `run` has ended, before the
+        links do."""
+        hub, flown = self._hub, self._traffic.flown if self._traffic is not None else ()
+        if hub is not None:
+            flying = [hub.drones[name] for name in flown if hub.drones[name].flies]
+            halts = [drone.act(_act(CommandKind.PAUSE), by_person=False) for drone in flying]
+            for drone, came in zip(flying, await asyncio.gather(*halts, return_exceptions=True), strict=True):
+                if isinstance(came, BaseException):
+                    _LOG.warning("%s: it was not halted: %s", drone.name, came)
+
+    async def _control(self) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            try:
+                if self._traffic is None:
+                    self._assemble()
+                else:
+                    self._traffic.step(int(loop.time() * 1000))
+            except Exception as err:  # noqa: BLE001 - the station goes on; nobody is released to more
+                _LOG.error("the traffic of the fleet failed, and begins anew", exc_info=True)
+                self._traffic, self._trouble = None, f"it failed: {err}"
+                await asyncio.sleep(_AGAIN_S)
+            await asyncio.sleep(_STEP_S)
+
+    def _assemble(self) -> None:
+        """Once every drone has told its map and where it stands: nobody flies before, for each may be
+        anywhere."""
+        floors: dict[str, FloorStatus] = {}
+        standings: dict[str, Standing] = {}
+        for name, drone in self._drones.items():
+            if drone.floor is not None and drone.standing is not None and drone.is_heard:
+                floors[name], standings[name] = drone.floor, drone.standing
+        if missing := [name for name in self._drones if name not in floors]:
+            self._trouble = f"{', '.join(missing)} did not tell yet where it stands on the ground"
+            return
+        stands = {name: standing.node for name, standing in standings.items()}
+        try:
+            floor = FleetFloor(floors, stands, self._cell)
+        except InputError as err:
+            if self._trouble != str(err):
+                _LOG.warning("the fleet does not fly: %s", err)
+            self._trouble = str(err)
+            return
+        self._trouble = ""
+        drones = {
+            name: FleetDrone(name, drone, floor, self._cell.uncertainty_m)
+            for name, drone in self._drones.items()
+        }
+        self._traffic = StationTraffic(floor, drones, pace_of(standings.values()), self._cell)
+
+    # what is asked of it
+
+    def ask(self, nodes: Sequence[str], drone: str = "") -> None:
+        """Have these nodes visited, by that drone or by whichever.  InputError for one that is not there,
+        UnavailableError where the fleet does not fly yet."""
+        if drone and drone not in self._drones:
+            raise InputError(f"no drone of the fleet is called {drone}")
+        if self._traffic is None:
+            raise UnavailableError(f"the fleet does not fly: {self._trouble}")
+        self._traffic.ask(nodes, drone)
+
+    def document(self) -> dict[str, Any]:
+        """How it is, as JSON has it."""
+        told = {} if self._traffic is None else self._traffic.document()
+        return {"flies": self._traffic is not None, "trouble": self._trouble, **told}
+
+    # as `Managers` and `hub.Viewer`
+
+    def hand_over(self, name: str, *, to_manager: bool) -> bool:
+        """As `Managers`."""
+        drone = self._drones.get(name)
+        if drone is not None:
+            drone.taken_by_person(not to_manager)
+        return drone is not None
+
+    def attach(self, wake: Callable[[], object] | None) -> None:
+        """No pictures are wanted here."""
+
+    def tell(self, drone: str, topic: str, value: Any) -> None:
+        """As `hub.Viewer`."""
+        if drone in self._drones:
+            self._drones[drone].tell(topic, value)
+
+    def show(self, key: PictureKey, picture: LinkPicture) -> None:
+        """No pictures are wanted here."""
+
+    def has_use_for(self, key: PictureKey) -> bool:  # noqa: ARG002 - as the protocol has it
+        """No pictures are wanted here."""
+        return False
+
+
+async def stop_all(hub: Hub) -> dict[str, str]:
+    """STOP to every drone of the station; for each why not, or nothing."""
+    drones = list(hub.drones.values())
+    answers = await asyncio.gather(
+        *(drone.act(_act(CommandKind.STOP)) for drone in drones), return_exceptions=True
+    )
+    found: dict[str, str] = {}
+    for drone, answer in zip(drones, answers, strict=True):
+        if isinstance(answer, BaseException) and not isinstance(answer, FlightdError):
+            raise answer
+        found[drone.name] = str(answer).removeprefix("refused: ") if isinstance(answer, FlightdError) else ""
+    return found
+
+
+def _act(kind: CommandKind) -> Act:
+    return Act(f"fleet-{uuid.uuid4().hex}", kind)
+
+
+def _tell_page(hub: Hub, name: str, taken: bool) -> None:
+    hub.tell(name, "manager", {"flies": not taken})

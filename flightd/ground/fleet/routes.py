@@ -1,0 +1,65 @@
+"""The station's fleet over HTTP: how it is, what it is to visit, and STOP for every drone."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from flightd.core.errors import InputError
+from flightd.core.planned_flight import MOST_NODES
+from flightd.ground.access.access import Access
+from flightd.ground.access.gate import address_of, identity_of, note_act
+from flightd.ground.fleet.own_fleet import OwnFleet, stop_all
+from flightd.ground.hub import Hub
+from flightd.ground.json_http import as_json, or_refused, said
+
+_Name = Annotated[str, Meta(max_length=128)]
+
+
+class AskedTour(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Nodes to be visited: by `drone`, empty: by whichever has the time."""
+
+    nodes: Annotated[list[_Name], Meta(min_length=1, max_length=MOST_NODES)]
+    drone: _Name = ""
+
+
+def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access) -> list[BaseRoute]:
+    """Without a `fleet` there is STOP alone."""
+
+    def own() -> OwnFleet:
+        if fleet is None:
+            raise InputError("the station flies no fleet; start it with --fleet")
+        return fleet
+
+    async def show(_: Request) -> Response:
+        return as_json(own().document())
+
+    async def ask(request: Request) -> Response:
+        asked = await said(request, AskedTour, "a tour")
+        note_act(request, f"visit {' '.join(asked.nodes)} {asked.drone}".rstrip())
+        own().ask(asked.nodes, asked.drone)
+        return as_json({})
+
+    async def stop(request: Request) -> Response:
+        refused = await stop_all(hub)
+        for drone, why in refused.items():
+            access.write_down(
+                identity_of(request),
+                address_of(request.scope),
+                "stop",
+                drone,
+                outcome="refused" if why else "accepted",
+                text=why,
+            )
+        return as_json({"refused": {drone: why for drone, why in refused.items() if why}})
+
+    return [
+        Route("/api/fleet", or_refused(show), methods=["GET"]),
+        Route("/api/fleet/tour", or_refused(ask), methods=["POST"]),
+        Route("/api/fleet/stop", or_refused(stop), methods=["POST"]),
+    ]

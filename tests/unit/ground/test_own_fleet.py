@@ -1,0 +1,281 @@
+"""The station flies several drones by traffic control: on paper, by virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from typing import Any, cast
+
+import pytest
+
+from flightd.adapters.ground_link.floor_status import floor_status
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.types import CommandKind, Phase
+from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.dispatcher import Dispatcher
+from flightd.fleet.vehicle.drone_factsheet import Measures
+from flightd.ground.fleet.fleet_floor import FleetFloor
+from flightd.ground.fleet.own_fleet import OwnFleet
+from flightd.ground.hub import Hub
+from flightd.ground.messages import Act
+from flightd.ground.mqtt.managed_drone import OrderRules
+from flightd.sim.fleet.judge import FleetJudge
+from flightd.site.site import Site
+from tests.rigs.event_loops import virtual
+from tests.rigs.paper_drones import STEP_S, PaperDrone, hall
+
+BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
+
+
+async def until(condition: Callable[[], Any], within_s: float = 30.0) -> None:
+    """Let them fly until it holds.  Fails when it does not in time."""
+    for _ in range(round(within_s / STEP_S)):
+        if condition():
+            return
+        await asyncio.sleep(STEP_S)
+    pytest.fail(f"not within {within_s:g} s")
+
+
+class PaperFleet:
+    """Drones, who flies them, and a judge; as much of a hub as they need."""
+
+    def __init__(self, sites: Mapping[str, Site], hold_s: float = 20.0) -> None:
+        self.written: list[tuple[str, str, str, str]] = []
+        self.own = OwnFleet(sites, BODY, OrderRules(hold_s, lambda *line: self.written.append(line)))
+        self.pages: dict[tuple[str, str], Any] = {}
+        self.drones = {name: PaperDrone(name, site, self.own.tell) for name, site in sites.items()}
+        self.judge = FleetJudge(CellSize(upright_m=100.0), 0.0)
+
+    def tell(self, drone: str, topic: str, value: Any) -> None:
+        """As the hub tells its pages."""
+        self.pages[drone, topic] = value
+
+    @property
+    def state(self) -> dict[str, Any]:
+        return self.own.document()
+
+    def flown(self, name: str) -> bool:
+        """By traffic."""
+        return bool(self.state["drones"][name]["flown"])
+
+    async def watch(self) -> None:
+        """Nobody meets anybody, at any time."""
+        loop = asyncio.get_running_loop()
+        while True:
+            self.judge.see(loop.time(), [drone.truth for drone in self.drones.values()], work_left=False)
+            await asyncio.sleep(STEP_S)
+
+    @contextlib.asynccontextmanager
+    async def flying(self) -> AsyncIterator[None]:
+        """The station runs meanwhile."""
+        hub = cast(Hub, self)
+        tasks = [asyncio.ensure_future(drone.run()) for drone in self.drones.values()]
+        tasks += [asyncio.ensure_future(self.watch()), asyncio.ensure_future(self.own.run(hub))]
+        try:
+            await until(lambda: self.state["flies"])
+            yield
+            assert self.judge.faults == []
+        finally:
+            tasks[-1].cancel()
+            await asyncio.wait(tasks[-1:])
+            await self.own.leave()
+            for task in tasks[:-1]:
+                task.cancel()
+            await asyncio.wait(tasks)
+
+
+def fly(
+    go: Callable[[PaperFleet], Coroutine[Any, Any, None]], names: str = "abc", *, counts: bool = False
+) -> PaperFleet:
+    """Do `go` while the fleet flies."""
+    fleet = PaperFleet({name: hall(name) for name in names})
+    for drone in fleet.drones.values():
+        drone.counts = counts
+
+    async def whole() -> None:
+        async with fleet.flying():
+            await go(fleet)
+
+    virtual(whole())
+    return fleet
+
+
+def test_a_tour_is_split_among_the_drones_and_all_come_home() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        fleet.own.ask(["A3", "A4", "B3", "B4"])
+        await until(lambda: len(fleet.state["done"]) == 4, 300)
+        await until(
+            lambda: all(drone.phase in {Phase.DONE, Phase.PREFLIGHT} for drone in fleet.drones.values()), 300
+        )
+
+    fleet = fly(go)
+    starts = [drone for what, drone, *_ in fleet.written if what == "start"]
+    assert len(starts) == len(set(starts)) > 1
+    assert {drone.truth.z_m for drone in fleet.drones.values()} == {0.0}
+
+
+def test_a_named_drone_visits_what_it_is_asked_for_round_the_one_that_a_person_took() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        await b.act(Act("by-ann-1", CommandKind.PAUSE))
+        fleet.own.ask(["A2"], "c")
+        await until(lambda: not fleet.flown("b"))
+        assert fleet.pages["b", "manager"] == {"flies": False}
+        assert fleet.state["drones"]["b"]["why"] == "a person has it"
+        await until(lambda: fleet.state["done"] == ["A2"], 200)
+        await until(lambda: fleet.drones["c"].phase is Phase.DONE, 200)
+        assert (b.phase, a.phase) == (Phase.HOLD, Phase.PREFLIGHT)
+        assert "goto" not in b.commands[b.commands.index("pause") + 1 :], "it is the person's"
+
+        assert fleet.own.hand_over("b", to_manager=True)
+        await until(lambda: b.phase is Phase.DONE, 200)  # between two nodes: it comes home by itself
+        assert b.commands[-1] == "home"
+
+    fly(go)
+
+
+def test_a_drone_that_holds_over_a_node_is_flown_on_when_it_is_given_back() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"])
+        await until(lambda: b.phase is Phase.HOVER and b.way[0] == "B2", 100)
+        await b.act(Act("by-ann-1", CommandKind.PAUSE))
+        await until(lambda: not fleet.flown("b") and b.phase is Phase.HOLD)
+        fleet.own.hand_over("b", to_manager=True)
+        await until(lambda: fleet.flown("b"))
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert "home" not in b.commands
+
+    fly(go, "b")
+
+
+def test_who_is_silent_has_his_way_home_to_himself_until_he_is_heard() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        b.heard = False
+        fleet.own.ask(["B2"], "c")
+        await until(lambda: not fleet.flown("b"))
+        await until(lambda: b.phase is Phase.DONE, 200)  # nobody pauses it at the end of its base
+        assert fleet.state["done"] == [], "nobody was sent into its way"
+        b.heard = True
+        await until(lambda: fleet.state["done"] == ["B2"], 300)
+        b.begin_anew()
+        await until(lambda: "B3" in fleet.state["done"], 300)
+
+    fly(go)
+
+
+def test_a_drone_that_landed_in_an_aisle_is_flown_round_until_a_person_says_that_it_is_away() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.HOVER and b.way[0] == "B3", 100)
+        b.phase, b.way = Phase.LAND, []  # a hazard
+        await until(lambda: b.phase is Phase.DONE)
+        fleet.own.ask(["A4", "B3"])
+        await until(lambda: fleet.state["done"] == ["A4"], 300)
+        await until(lambda: fleet.drones["c"].phase is Phase.DONE, 300)
+        assert (fleet.state["done"], fleet.flown("b")) == (["A4"], False)
+        b.begin_anew()
+        await asyncio.sleep(60.0)
+        assert (fleet.state["done"], fleet.flown("b")) == (["A4"], False), "it may lie there still"
+        fleet.own.hand_over("b", to_manager=True)
+        await until(lambda: fleet.state["done"] == ["A4", "B3"], 300)
+
+    fly(go)
+
+
+def test_what_another_station_commands_takes_a_drone_and_the_end_halts_the_others() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        fleet.own.ask(["A3", "B3"])
+        await until(lambda: a.phase is Phase.FOLLOW and b.phase is Phase.FOLLOW, 100)
+        b.ordered_elsewhere("home")
+        await until(lambda: not fleet.flown("b"))
+
+    fleet = fly(go, "ab")
+    assert fleet.drones["a"].paused
+    assert not fleet.drones["b"].paused, "it is somebody else's"
+
+
+def test_where_traffic_fails_everybody_ends_his_base_and_is_brought_home_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        fleet.own.ask(["A3", "B3"])
+        await until(lambda: a.phase is Phase.HOVER and a.way[0] == "A2", 100)
+        with monkeypatch.context() as patched:
+            patched.setattr(Dispatcher, "step", lambda *_: 1 / 0)
+            await until(lambda: not fleet.state["flies"])
+            assert fleet.state["trouble"] == "it failed: division by zero"
+            await until(lambda: a.phase is Phase.HOLD and b.phase is Phase.HOLD)
+        await until(lambda: a.phase is Phase.DONE and b.phase is Phase.DONE, 300)
+
+    fly(go, "ab")
+
+
+def test_a_drone_that_counts_is_not_sent_on_before_its_count_is_over() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a = fleet.drones["a"]
+        fleet.own.ask(["A2", "A3"])
+        await until(lambda: a.phase is Phase.HOVER and a.way[0] == "A2", 100)
+        await asyncio.sleep(4.0)
+        assert (fleet.state["done"], a.phase) == ([], Phase.HOVER)
+        await until(lambda: fleet.state["done"] == ["A2"], 10)
+        await until(lambda: a.phase is Phase.DONE, 300)
+        assert fleet.state["done"] == ["A2", "A3"]
+
+    fly(go, "a", counts=True)
+
+
+def test_what_a_drone_has_that_does_not_start_is_given_to_another_one() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        fleet.drones["a"].never_starts = True
+        fleet.own.ask(["A2"])
+        await until(lambda: fleet.state["given"] == {"A2": "a"})
+        await until(lambda: fleet.state["done"] == ["A2"], 200)
+        assert (fleet.drones["a"].phase, fleet.drones["b"].flies) == (Phase.PREFLIGHT, True)
+
+    fly(go, "ab")
+
+
+def test_a_drone_with_little_left_is_sent_nowhere() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        fleet.drones["a"].left_s = 30.0
+        await asyncio.sleep(1.0)
+        fleet.own.ask(["A2"])
+        await asyncio.sleep(30.0)
+        assert (fleet.state["open"], fleet.drones["a"].commands) == (["A2"], [])
+
+    fly(go, "a")
+
+
+def test_nodes_and_drones_that_are_not_there_are_refused() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        with pytest.raises(InputError, match="no node is called A9"):
+            fleet.own.ask(["A2", "A9"])
+        with pytest.raises(InputError, match="no drone of the fleet is called z"):
+            fleet.own.ask(["A2"], "z")
+
+    fly(go, "a")
+    with pytest.raises(UnavailableError, match="does not fly"):
+        PaperFleet({"a": hall("a")}).own.ask(["A2"])
+
+
+def test_drones_of_different_maps_or_with_one_pad_are_not_flown_together() -> None:
+    a, b, cell = floor_status(hall("a")), floor_status(hall("b")), CellSize()
+    assert FleetFloor({"a": a, "b": b}, {"a": "A1", "b": "B1"}, cell).pads.keys() == {"a", "b"}
+    refused = [
+        ({"a": a, "b": floor_status(hall("b", "shed"))}, "B1", "a and b fly by different maps: hall, shed"),
+        ({"a": a, "b": a}, "A1", "the pads of a and b are 0.0 m apart"),
+        ({"a": a, "b": b}, "A1", "b stands on the pad at A1 and comes home to that at B1"),
+    ]
+    for floors, stands, why in refused:
+        with pytest.raises(InputError, match=why):
+            FleetFloor(floors, {"a": "A1", "b": stands}, cell)
