@@ -4,7 +4,8 @@ M. Phillips and M. Likhachev, "SIPP: Safe Interval Path Planning for Dynamic Env
 drone at cruising speed cannot wait, so that an early arrival there is not better than a late one: such
 states keep the interval of all their possible arrivals, as in Z. Ali and K. Yakovlev, "Safe Interval Path
 Planning with Kinodynamic Constraints" (SIPP-IP), AAAI 2023.  Both together are complete and optimal over
-the motions.
+the motions.  With a weight above 1, sections of aisles in which the drone neither begins nor ends are flown
+through without a stop, unless there is no other way.
 """
 
 from __future__ import annotations
