@@ -67,20 +67,18 @@ class Sipp:
 
     def legs(self, configuration: int, at_ms: int, goal: Stop, effort: Effort) -> Iterator[Leg]:
         """Ways from rest at `at_ms` to the goal, done there, the earliest first: one for each safe interval
-        in which it ends.  A goal without dwelling is one to stay at for good."""
+        in which it ends.  A goal without dwelling is one to stay at for good.  With a weight above 1, first
+        those that stop in no section but those of their ends."""
         rest_ms = self._distances.to(goal.vertex)
         if rest_ms[configuration >> 3] >= NEVER:
             return
         guide = _Guide(self._steps, rest_ms, goal.vertex, self._weight)
+        done: set[int] = set()
         if self._weight > 1.0:
             onward = self._through(configuration >> 3, goal.vertex)
-            found = False
-            for leg in _Search(onward, self._table, guide, goal, effort).run(configuration, at_ms):
-                found = True
-                yield leg
-            if found:
-                return
-        yield from _Search(self._steps.onward, self._table, guide, goal, effort).run(configuration, at_ms)
+            yield from _Search(onward, self._table, guide, goal, effort).run(configuration, at_ms, done)
+        everywhere = self._steps.onward
+        yield from _Search(everywhere, self._table, guide, goal, effort).run(configuration, at_ms, done)
 
     def _through(self, start: int, goal: int) -> _Onward:
         """The steps of a drone that stops in no section of an aisle but in those of its start and goal."""
@@ -136,13 +134,13 @@ class _Search:
         self._covered: dict[int, tuple[list[int], list[int]]] = {}
         self._guide = guide
 
-    def run(self, configuration: int, at_ms: int) -> Iterator[Leg]:
+    def run(self, configuration: int, at_ms: int, done: set[int]) -> Iterator[Leg]:
+        """Legs that end in safe intervals whose ends are not in `done`, and are then."""
         until = self._safe_until(configuration >> 3, at_ms)
         if until < 0:
             return
         self._best[configuration, until] = at_ms
         self._push(0, configuration, at_ms, until, None)
-        done: set[int] = set()
         goal_vertex = self._goal.vertex
         queue, states, best, effort = self._queue, self._states, self._best, self._effort
         while queue:
