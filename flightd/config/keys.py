@@ -72,8 +72,8 @@ def _named_values(field: FieldInfo) -> tuple[str, ...]:
 
 
 def section_of(field: FieldInfo) -> type[BaseModel] | None:
-    """The section that a field holds, once or any number of times; None for a plain key."""
-    kind = typing.get_args(field.annotation)[0] if holds_many(field) else field.annotation
+    """The section that a field holds, once or any number of times, or may hold; None for a plain key."""
+    kind = typing.get_args(field.annotation)[0] if holds_many(field) else _plain(field.annotation)
     return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
 
 

@@ -27,6 +27,12 @@ _TABLE = """CREATE TABLE IF NOT EXISTS expected_stock (
     data BLOB NOT NULL
 ) STRICT"""
 """Made with the first upload: files from before it are kept as they are."""
+_DROP_TABLE = """CREATE TABLE IF NOT EXISTS expected_stock_drop (
+    inbox TEXT PRIMARY KEY,
+    name TEXT NOT NULL,
+    sha256 TEXT NOT NULL,
+    said TEXT NOT NULL
+) STRICT"""
 _ONE = """SELECT name, who, utc_ns, changed_ns, place, code, quantity, heading FROM expected_stock
 WHERE store = ?"""
 
@@ -43,14 +49,26 @@ class ExpectedStock:
     columns: StockColumns
 
 
+@dataclass(frozen=True, slots=True)
+class Drop:
+    """The newest file of an `inbox` whose content is kept, and which may lie there still, by `name` and
+    `sha256`; `said` is what whoever dropped it is told."""
+
+    inbox: str
+    name: str
+    sha256: str
+    said: str
+
+
 class ExpectedStockBook:
     """In the station's file in `folder`.  Safe from any thread; errors as of `OwnDatabase`."""
 
     def __init__(self, folder: Path) -> None:
         self._database = station_file(folder)
 
-    def keep(self, store: str, upload: ExpectedStock, data: bytes) -> None:
-        """Keep an upload in place of the store's one before; the oldest of other stores make room for it."""
+    def keep(self, store: str, upload: ExpectedStock, data: bytes, drop: Drop | None = None) -> None:
+        """Keep an upload in place of the store's one before; the oldest of other stores make room for it.
+        That it came by a `drop` is noted in the same transaction, until `moved`."""
         columns = upload.columns
         with self._database.changed() as book:
             book.execute(_TABLE)
@@ -62,6 +80,22 @@ class ExpectedStockBook:
                 ),
             )  # fmt: skip
             _make_room(book)
+            if drop is not None:
+                book.execute(_DROP_TABLE)
+                row = (drop.inbox, drop.name, drop.sha256, drop.said)
+                book.execute("INSERT OR REPLACE INTO expected_stock_drop VALUES (?, ?, ?, ?)", row)
+
+    def dropped(self, inbox: str) -> Drop | None:
+        """What is noted of a file that may lie in the inbox still."""
+        question = "SELECT inbox, name, sha256, said FROM expected_stock_drop WHERE inbox = ?"
+        row = self._read("expected_stock_drop", question, inbox)
+        return None if row is None else Drop(*row)
+
+    def moved(self, inbox: str) -> None:
+        """That file lies there no more: one of the same name and content is another from now on."""
+        if self.dropped(inbox) is not None:
+            with self._database.changed() as book:
+                book.execute("DELETE FROM expected_stock_drop WHERE inbox = ?", (inbox,))
 
     def choose(self, store: str, columns: StockColumns, changed_ns: int) -> None:
         """The store's upload has other columns from now on; nothing where there is none any more."""
@@ -81,7 +115,7 @@ class ExpectedStockBook:
 
     def kept(self, store: str) -> ExpectedStock | None:
         """The store's upload, None where there is none."""
-        row = self._read(_ONE, store)
+        row = self._read("expected_stock", _ONE, store)
         if row is None:
             return None
         name, who, utc_ns, changed_ns, place, code, quantity, heading = row
@@ -91,16 +125,16 @@ class ExpectedStockBook:
 
     def data(self, store: str) -> bytes | None:
         """What was uploaded, byte by byte; None where nothing is kept any more."""
-        row = self._read("SELECT data FROM expected_stock WHERE store = ?", store)
+        row = self._read("expected_stock", "SELECT data FROM expected_stock WHERE store = ?", store)
         return None if row is None else bytes(row[0])
 
-    def _read(self, question: str, store: str) -> tuple[Any, ...] | None:
+    def _read(self, table: str, question: str, *values: str) -> tuple[Any, ...] | None:
         if not self._database.file.exists():
             return None
         with self._database.opened() as book:
-            if not book.execute("SELECT 1 FROM sqlite_schema WHERE name = 'expected_stock'").fetchone():
+            if not book.execute("SELECT 1 FROM sqlite_schema WHERE name = ?", (table,)).fetchone():
                 return None
-            row: tuple[Any, ...] | None = book.execute(question, (store,)).fetchone()
+            row: tuple[Any, ...] | None = book.execute(question, values).fetchone()
             return row
 
 

@@ -62,6 +62,7 @@ NO_PAGE = {
     "ground/mqtt": "options of the command line, and the broker's own connection",
     "ground/server.py": "options of the command line",
     "ground/tls.py": "options of the command line",
+    "ground/wms_exchange": "of the command line, and of the notes beside files that were dropped",
     "mission/machine.py": "errors of ours",
     "mission/safety/hazard_table.py": "the table of hazards in the guide, which is English",
     "site/aisle_grid.py": "lines of a site file",

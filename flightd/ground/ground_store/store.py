@@ -10,12 +10,13 @@ from typing import Any, Self
 
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
-from flightd.ground.ground_store import events, pages
+from flightd.ground.ground_store import events, outbox, pages
 from flightd.ground.ground_store.batch import Batch, Receipt
 from flightd.ground.ground_store.engine import Engine, Session, listed
 from flightd.ground.ground_store.events import Event
 from flightd.ground.ground_store.evidence import Evidence
 from flightd.ground.ground_store.migrations import brought_up
+from flightd.ground.ground_store.outbox import Outbox, OutgoingFile
 from flightd.ground.ground_store.pages import MOST_ROWS, Mark
 from flightd.ground.ground_store.parquet import export
 from flightd.ground.ground_store.take_batch import Taken, take_batch
@@ -99,6 +100,16 @@ class GroundStore:
         """As `events.taken`."""
         with self._engine.writing() as session:
             events.taken(session, hook, event)
+
+    def next_file(self, site: str, box: Outbox) -> OutgoingFile | None:
+        """As `outbox.next_file`, of a site that the store knows."""
+        with self._engine.writing() as session:
+            return outbox.next_file(session, pages.site_id(session, site), box)
+
+    def file_lies_there(self, box: str, file: str) -> None:
+        """As `outbox.file_lies_there`."""
+        with self._engine.writing() as session:
+            outbox.file_lies_there(session, box, file)
 
     def counts(self) -> dict[str, int]:
         """How much the store holds."""

@@ -68,6 +68,7 @@ WRONG: dict[str, tuple[str, ...]] = {
     "flightd store prune": (".", "--store", "none://x"),
     "flightd store show": ("--store", "."),
     "flightd store export": ("--store", "none://x", "--out", "x.parquet"),
+    "flightd store exchange": ("none.toml",),
     "flightctl keygen": ("ann", "--role", "captain"),
     "flightctl protocol": ("--json", "surplus"),
     "flightctl goto": ("A2",),

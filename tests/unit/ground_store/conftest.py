@@ -14,6 +14,7 @@ from flightd.ground.ground_store.postgres_engine import PostgresEngine
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
 from tests.rigs.postgres import postgres
+from tests.rigs.wms_exchange import Cuts, cut_exchanges, make_place
 
 
 @pytest.fixture(scope="session")
@@ -38,3 +39,15 @@ def engine(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[
 def store(engine: Callable[[], Engine], tmp_path: Path) -> Iterator[GroundStore]:
     with GroundStore(engine(), FolderEvidence(tmp_path / "evidence")) as opened:
         yield opened
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """A station and its drop folders."""
+    return make_place(tmp_path)
+
+
+@pytest.fixture
+def cuts(monkeypatch: pytest.MonkeyPatch) -> Cuts:
+    """Of every file system and every transaction of an exchange from now on."""
+    return cut_exchanges(monkeypatch)

@@ -20,6 +20,7 @@ from flightd.config.reference import rows, tables
 from flightd.config.schema import parse_config
 from flightd.core.inventory import LocationState
 from flightd.core.types import Image, Phase
+from flightd.ground.wms_exchange.exchange_file import ExchangeFile
 from flightd.guide.pages import FOLDER, TOPICS, page, pages
 from flightd.runtime.frame_notice import decode_notice, encode_notice
 from flightd.sim.scenario.fault_schema import Fault
@@ -86,6 +87,8 @@ def test_a_block_of_toml_is_what_its_program_takes(name: str, text: str, tmp_pat
         parse_site(text, name)
     elif name == "simulation.md":
         Scenario.model_validate(table)
+    elif name == "store.md":
+        ExchangeFile.model_validate(table)
     else:
         table.setdefault("mission", {}).setdefault("site", "hall.toml")
         parse_config(table, tmp_path / "flightd.toml")

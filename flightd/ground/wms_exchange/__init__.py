@@ -1,0 +1,6 @@
+"""Drop folders for a warehouse management system: its expected stock comes in, counts go out, as CSV by its
+own column names.
+
+`exchange` makes one pass by an `exchange_file`; `inbox` and `outbox` are its two halves, each in a
+`drop_folder`, here or wherever fsspec reaches.
+"""

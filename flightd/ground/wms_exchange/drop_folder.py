@@ -1,0 +1,156 @@
+"""A folder that another program fills or empties, here or wherever fsspec reaches.
+
+Files get their names by renaming: nobody sees half of one.  That holds where renaming is one step, as on a
+disk and over SFTP.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from typing import Any, TypeAlias
+from urllib.parse import urlsplit
+
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.extras import missing_extra
+from flightd.runtime.durable_files import sync_folder
+
+PASSWORD = "FLIGHTD_SFTP_PASSWORD"  # noqa: S105 - the name of a variable
+Stamp: TypeAlias = tuple[int, str]
+"""Size and time of a file: another whenever it is written."""
+_WRITTEN_STILL = (".tmp", ".part", ".partial", ".filepart", ".crdownload", "~")
+
+
+class DropFolder:
+    """The folder at `address`, which `key` of `file` names.
+
+    Whatever it refuses is an UnavailableError that names all three."""
+
+    def __init__(self, address: str, file: Path, key: str) -> None:
+        """InputError where there is no such folder."""
+        self._file, self._key = file, key
+        self.address = address
+        with self._refusals("cannot be opened"):
+            self._files, self._path = file_system(address, file, key)
+            if not self._files.isdir(self._path):
+                self.close()
+                remedy = "make it, or correct the key"
+                raise InputError(f"{address}: there is no such folder", file=file, key=key, remedy=remedy)
+
+    def close(self) -> None:
+        """Of a connection."""
+        client = getattr(self._files, "client", None)
+        if client is not None:
+            client.close()
+
+    def listed(self, below: str = "") -> dict[str, Stamp]:
+        """Whole files by name; none where there is no folder `below`, which is one of ours."""
+        with self._refusals("cannot be listed"):
+            path = self._at(below)
+            if below and not self._files.isdir(path):
+                return {}
+            self._files.invalidate_cache()
+            found = {PurePosixPath(one["name"]).name: one for one in self._files.ls(path, detail=True)}
+        return {
+            name: (int(one["size"] or 0), str(one.get("mtime") or one.get("created")))
+            for name, one in found.items()
+            if one["type"] == "file" and not name.startswith(".") and not name.endswith(_WRITTEN_STILL)
+        }
+
+    def read(self, name: str, most: int) -> bytes:
+        """At most so many bytes of it."""
+        with self._refusals(f"{name} cannot be read"), self._files.open(self._at(name), "rb") as stream:
+            return bytes(stream.read(most))
+
+    def write(self, name: str, data: bytes) -> None:
+        """All of it under its name, or none; on the disk, where that is here."""
+        path = PurePosixPath(name)
+        beside = self._at(str(path.with_name(f".{path.name}.tmp")))
+        with self._refusals(f"{name} cannot be written"):
+            self._make(name)
+            with self._files.open(beside, "wb") as stream:
+                stream.write(data)
+                stream.flush()
+                if self._is_here:
+                    os.fsync(stream.fileno())
+            self._rename(beside, self._at(name))
+
+    def move(self, name: str, to: str) -> None:
+        """In the place of what has that name already."""
+        with self._refusals(f"{name} cannot be moved to {to}"):
+            self._make(to)
+            self._rename(self._at(name), self._at(to))
+
+    @property
+    def _is_here(self) -> bool:
+        return bool(getattr(self._files, "local_file", False))
+
+    def _at(self, name: str) -> str:
+        return f"{self._path.rstrip('/')}/{name}" if name else self._path
+
+    def _make(self, name: str) -> None:
+        """The folder of ours in which a file shall be."""
+        parent = str(PurePosixPath(name).parent)
+        if parent != "." and not self._files.isdir(self._at(parent)):
+            self._files.makedirs(self._at(parent), exist_ok=True)
+
+    def _rename(self, path: str, to: str) -> None:
+        self._files.mv(path, to)
+        if self._is_here:
+            for folder in {Path(path).parent, Path(to).parent}:
+                sync_folder(folder)
+
+    @contextmanager
+    def _refusals(self, what: str) -> Iterator[None]:
+        try:
+            yield
+        except _refused_by() as err:
+            text = getattr(err, "strerror", None) or str(err) or type(err).__name__
+            raise UnavailableError(
+                f"{self.address}: {what}: {text}",
+                file=self._file,
+                key=self._key,
+                remedy="may flightd read and write there?",
+            ) from None
+
+
+def file_system(address: str, file: Path, key: str) -> tuple[Any, str]:
+    """The file system of a folder or URL, and the path on it."""
+    try:
+        import fsspec
+    except ModuleNotFoundError:
+        raise missing_extra("exchange", "flightd store exchange") from None
+    if urlsplit(address).scheme in {"sftp", "ssh"}:
+        return _sftp(address, file, key)
+    files, path = fsspec.core.url_to_fs(address, skip_instance_cache=True)
+    return files, str(path)
+
+
+def _sftp(address: str, file: Path, key: str) -> tuple[Any, str]:
+    parts = urlsplit(address)
+    if parts.password:
+        raise InputError(
+            "a password does not belong into the file",
+            file=file,
+            key=key,
+            remedy=f"give it in {PASSWORD}, or use a key",
+        )
+    if not parts.hostname or not parts.path:
+        raise InputError("not the URL of a folder", file=file, key=key, remedy="give sftp://USER@HOST/FOLDER")
+    try:
+        from flightd.ground.wms_exchange.known_host_sftp import KnownHostSftp
+    except ModuleNotFoundError:
+        raise missing_extra("exchange", "sftp://…") from None
+    given = {"port": parts.port, "username": parts.username, "password": os.environ.get(PASSWORD)}
+    asked = {name: value for name, value in given.items() if value}
+    return KnownHostSftp(parts.hostname, skip_instance_cache=True, **asked), parts.path
+
+
+def _refused_by() -> tuple[type[Exception], ...]:
+    """What file systems raise; paramiko's own where it is in use."""
+    paramiko = sys.modules.get("paramiko")
+    ssh = () if paramiko is None else (paramiko.SSHException,)
+    return (OSError, EOFError, ValueError, ImportError, *ssh)
