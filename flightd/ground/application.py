@@ -49,6 +49,8 @@ from flightd.ground.page_person import PagePeople, PagePerson, Standing
 from flightd.ground.pages import STATIC, first_page
 from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.schedules.night_shift import THIS_MACHINE, StationClock
+from flightd.ground.schedules.routes import schedule_routes
 from flightd.ground.site_page.routes import site_page
 from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.stock_page import stock_page
@@ -82,12 +84,13 @@ def application(
     managers: Managers | None = None,
     store: GroundStore | None = None,
     own_fleet: OwnFleet | None = None,
+    clock: StationClock = THIS_MACHINE,
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
     `people` who sits at a page, inventories, site files and `flights` lie under `folder`, more inventories
     under the `others`, `uploads` reads what people send, `maps` lays out maps, `studio` and `simulated` are
-    None without a folder; `managers` fly drones, too; programs ask the `store`; `own_fleet` takes
-    tours."""
+    None without a folder; `managers` fly drones, too; programs ask the `store`; `own_fleet` takes tours;
+    schedules go by the `clock`."""
     orders = Orders(hub.drones, access)
     routes = [
         first_page(),
@@ -99,6 +102,7 @@ def application(
         *studio_routes(studio),
         *doctor_routes(hub.drones, access, None if studio is None else studio.shelf),
         *mission_routes(folder, hub.drones, hub.for_each, others),
+        *schedule_routes(folder, clock.utc_ns),
         *manager_routes(managers),
         *fleet_routes(own_fleet, hub, access),
         *store_routes(store),

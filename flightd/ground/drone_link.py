@@ -33,6 +33,8 @@ _TRACK_KEPT = 4000
 MOST_ACTS = 16
 """So many acts may wait for their answer at once; what lands the drone is never turned away."""
 _MOST_QUESTIONS = 4
+_SILENT_S = 3.0
+"""A drone that has told nothing for so long is not heard."""
 _LANDED_S = 3600.0
 """No drone flies so long after it was heard last."""
 _VISITED = "visited"
@@ -85,6 +87,7 @@ class DroneLink:
         self._missed: Counter[type] = Counter()
         self._round_trip_ms: float | None = None
         self._attends = False
+        self._status: StatusReport | None = None
         self._armed = False
         self._trouble = "connecting"
         self._acting = 0
@@ -94,6 +97,10 @@ class DroneLink:
         """Hears what is left of the drone's plan, whenever that changes."""
         self.on_person: Callable[[], None] = lambda: None
         """Hears that a person commands the drone, before it does."""
+        self.attends_run = False
+        """The station attends by itself: a flight of its schedules is due, or on."""
+        self.by_person_at_s = -math.inf
+        """When a person of this station commanded the drone last, by the loop's clock."""
         self._plan_changed = asyncio.Event()
         self._plan_seen: tuple[object, ...] = ()
 
@@ -102,6 +109,18 @@ class DroneLink:
         """Its motors were armed when it was heard last; silence is no landing, but for an hour of it."""
         now_s = asyncio.get_running_loop().time()
         return self._armed and self._heard_at_s is not None and now_s - self._heard_at_s < _LANDED_S
+
+    @property
+    def welcome(self) -> Welcome | None:
+        """Who answers there, what the station may do, and the map; None before it was reached."""
+        return self._welcome
+
+    @property
+    def heard(self) -> StatusReport | None:
+        """Its newest status; None where it is not heard now."""
+        at_s, now_s = self._heard_at_s, asyncio.get_running_loop().time()
+        is_heard = self._client is not None and at_s is not None and now_s - at_s < _SILENT_S
+        return self._status if is_heard else None
 
     async def run(self) -> None:
         """Connect, and again after whatever went wrong."""
@@ -122,7 +141,7 @@ class DroneLink:
     async def act(self, act: Act, *, by_person: bool = True) -> Accepted:
         """Hand an act to the drone; its answer.  As `GroundClient` raises; RunError where too many wait."""
         if by_person:
-            self.on_person()
+            self._note_person()
         client = self._client
         if client is None:
             raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
@@ -153,7 +172,7 @@ class DroneLink:
     ) -> Planned:
         """Hand the drone the nodes of its next flight, or ask what that would be.  As `act` raises."""
         if by_person and not dry:
-            self.on_person()
+            self._note_person()
         client = self._client
         if client is None:
             raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
@@ -172,6 +191,10 @@ class DroneLink:
             )
         finally:
             self._acting -= 1
+
+    def _note_person(self) -> None:
+        self.by_person_at_s = asyncio.get_running_loop().time()
+        self.on_person()
 
     async def ask(self, question: Callable[[GroundClient], Awaitable[_T]]) -> _T:
         """What the drone answers to a question of who looks after it.  As `GroundClient` raises;
@@ -259,7 +282,7 @@ class DroneLink:
     def _take_status(self, report: StatusReport) -> None:
         now_s = asyncio.get_running_loop().time()
         silent = self._heard_at_s is None or now_s - self._heard_at_s > _STATE_S
-        self._heard_at_s = now_s
+        self._heard_at_s, self._status = now_s, report
         self._clock_s = min(self._clock_s, now_s - report.stamp_ns * 1e-9)
         if report.vehicle is not None:  # a daemon that was started anew in flight has not heard it yet
             self._armed = report.vehicle.armed
@@ -297,16 +320,22 @@ class DroneLink:
                 await self.on_plan(plan)
 
     async def _attend(self, client: GroundClient) -> None:
-        """Attend while the page of somebody is open who may fly; without one only measure the way.  With a
-        viewer's key it cannot attend."""
+        """Attend while the page of somebody is open who may fly, or a run of a schedule is on; else only
+        measure the way.  A run that did not come to fly is left again, and nobody is missed.  With a viewer's
+        key it cannot attend."""
         loop = asyncio.get_running_loop()
+        for_run = False
         while True:
             began_s = loop.time()
             try:
                 may = self._welcome is not None and self._welcome.role is Role.OPERATOR
-                if may and self._pages.is_attended:
+                by_page = self._pages.is_attended
+                if may and (by_page or self.attends_run):
                     await client.attend()
-                    self._attends = True
+                    self._attends, for_run = True, not by_page
+                elif for_run and not self.flies:
+                    await client.attend(leave=True)
+                    self._attends = for_run = False
                 else:
                     self._attends = False
                     await client.status()

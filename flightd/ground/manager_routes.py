@@ -23,6 +23,10 @@ class Managers(Protocol):
         """A person takes a drone, or gives it (back); False where no manager flies it."""
         ...
 
+    def flies(self, name: str) -> bool:
+        """A manager flies the drone, and no person."""
+        ...
+
 
 class HandOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Whether the manager flies from now on."""

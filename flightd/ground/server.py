@@ -28,11 +28,14 @@ from flightd.ground.ground_store.webhooks import Webhook
 from flightd.ground.guards import own_hosts
 from flightd.ground.hub import Hub, Viewer
 from flightd.ground.messages import MAX_PAGE_MESSAGE_BYTES
+from flightd.ground.missions.mission_book import MissionBook
 from flightd.ground.page_person import PagePeople
 from flightd.ground.page_socket import PageSocket
 from flightd.ground.quiet_log import quiet_log
 from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.schedules.night_shift import THIS_MACHINE, NightShift, StationClock
+from flightd.ground.schedules.schedule_book import ScheduleBook
 from flightd.ground.site_page.simulated_flight import SimulatedFlight
 from flightd.ground.studio.studio import Studio
 from flightd.ground.tls import Certificate
@@ -197,12 +200,15 @@ async def serve(
     store: GroundStore | None = None,
     hooks: Sequence[Webhook] = (),
     own_fleet: OwnFleet | None = None,
+    clock: StationClock = THIS_MACHINE,
 ) -> None:
     """Serve until cancelled; the pages are told that it ends.  `access` knows who asks, and is closed at the
     end; inventories and flights lie under `folder` and the `others`; `viewers` are told what pages are;
     `fleet` has the drones flown by somebody else's manager; `store` is fed with what lies there, asked by
-    programs, and `hooks` are told of it; `own_fleet` is flown by the station itself."""
+    programs, and `hooks` are told of it; `own_fleet` is flown by the station itself; the schedules kept in
+    `folder` go by the `clock`."""
     viewers = (*viewers, *(viewer for viewer in (fleet, own_fleet) if viewer is not None))
+    managers = fleet if own_fleet is None else own_fleet
     hub = Hub(drones, viewers, attends=own_fleet is not None)
     flights, uploads = Flights(folder, others=others), ReadingProcess()
     studio = None if folder is None else Studio(folder, flights)
@@ -226,9 +232,10 @@ async def serve(
                 studio,
                 simulated,
                 others,
-                fleet if own_fleet is None else own_fleet,
+                managers,
                 store,
                 own_fleet,
+                clock,
             ),
             http="h11",
             ws=PageSocket,
@@ -253,6 +260,10 @@ async def serve(
         managed = [
             tasks.create_task(one.run(hub), name="fleet") for one in (fleet, own_fleet) if one is not None
         ]
+        if folder is not None:
+            book, missions = ScheduleBook(folder), MissionBook(folder)
+            shift = NightShift(book, missions, store, hub.drones, access, managers, clock)
+            tasks.create_task(shift.run(), name="schedules")
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")
         if simulated is not None:

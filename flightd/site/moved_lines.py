@@ -40,6 +40,7 @@ def moved(site: Site, y_m: Mapping[str, float], x_m: Mapping[str, float]) -> Sit
         line_colour=site.line_colour,
         ceiling_m=site.ceiling_m if site.ceiling_given else None,
         interlock=site.interlock,
+        unattended_start=site.unattended_start,
         racks=site.racks,
         one_way_crosses=[(edge.a, edge.b) for edge in site.crosses if edge.one_way],
         blocked=site.blocked,

@@ -203,6 +203,8 @@ class Site:
     markers: tuple[Marker, ...] = ()
     interlock: bool = False
     """Whether nothing may arm here unless an interlock says that the aisles are closed to people."""
+    unattended_start: bool = False
+    """Whether a ground station's schedules may start a flight here without a person."""
     ceiling_given: bool = True
     """Whether the site file gives the ceiling; otherwise it is ASSUMED_CEILING_M."""
 

@@ -109,6 +109,8 @@ def site_toml(site: Site) -> str:
         parts.append(f"ceiling_m = {site.ceiling_m!r}")
     if site.interlock:
         parts.append("interlock = true")
+    if site.unattended_start:
+        parts.append("unattended_start = true")
     for aisle in site.aisles:
         parts += ["", "[[aisle]]", f"id = {quoted(aisle.id)}"]
         parts += [f"x_m = {aisle.x_m!r}", f"y_m = {aisle.y_m!r}"]

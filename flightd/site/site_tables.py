@@ -33,6 +33,7 @@ class _SiteTable(Section):
     )
     ceiling_m: float | None = Field(None, gt=0, le=1000, allow_inf_nan=False)
     interlock: bool = False
+    unattended_start: bool = False
 
 
 class _AisleTable(Section):
@@ -177,6 +178,7 @@ def site_of(tables: Mapping[str, Any]) -> Site:
             line_colour=file.site.line_colour,
             ceiling_m=file.site.ceiling_m,
             interlock=file.site.interlock,
+            unattended_start=file.site.unattended_start,
             racks=[_rack(rack, file.aisle) for rack in file.rack],
             one_way_crosses=[cross.nodes for cross in file.cross if cross.one_way],
             blocked=[blocked.nodes for blocked in file.blocked],

@@ -37,6 +37,7 @@ SOURCES = (
     "doctor/calibration.py",
     "doctor/exposure.py",
     "doctor/machine.py",
+    "fleet/schedule",
     "ground",
     "inventory/stock_columns.py",
     "inventory/stock_table.py",
@@ -87,6 +88,7 @@ STAYS_ENGLISH = {
     "flightd ground --folder out": "a command to type",
     "SELECT data FROM expected_stock WHERE store = ?": "a question to the book",
     "interlock = true": "a line of a site file",
+    "unattended_start = true": "a line of a site file",
     "manual_exposure = true": "a line of the configuration",
     "{} ({} cameras take it)": "the end of a refusal, which has its German as a whole",
     "{}, and leave the key out": "the middle of that",
@@ -131,8 +133,8 @@ _BROKEN: tuple[Mapping[str, Any], ...] = (
 
 _ERRORS = re.compile(r"(?!Type|Runtime|Assertion)\w*Error")
 _CALLS = frozenset(
-    {"Check", "Event", "Room", "Rule", "SiteMistake", "Threads", "__init__", "_finding", "_read", "_refuse",
-     "answered", "append", "close", "decoded", "error", "json_body", "kill", "missing_extra",
+    {"Check", "Event", "Objection", "Room", "Rule", "SiteMistake", "Threads", "__init__", "_finding", "_read",
+     "_refuse", "answered", "append", "close", "decoded", "error", "json_body", "kill", "missing_extra",
      "note", "ok", "parse_site", "read_draft", "reader", "refusal", "report", "said", "unseen",
      "warning", "withdraw"}
 )  # fmt: skip

@@ -22,6 +22,7 @@ from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.hub import Viewer
 from flightd.ground.mqtt.fleet_link import FleetLink
+from flightd.ground.schedules.night_shift import THIS_MACHINE, StationClock
 from flightd.ground.server import Listening, opened, serve
 
 JSON = {"Content-Type": "application/json"}
@@ -109,9 +110,10 @@ async def served(
     fleet: FleetLink | None = None,
     store: GroundStore | None = None,
     own_fleet: OwnFleet | None = None,
+    clock: StationClock = THIS_MACHINE,
 ) -> AsyncIterator[Station]:
     """A station that serves meanwhile; flights lie below `folder`, people and audit in `state`; its system
-    takes so many bytes at once for a page (None: as many as it likes)."""
+    takes so many bytes at once for a page (None: as many as it likes).  Schedules go by the `clock`."""
     listener, where = opened(Listening("127.0.0.1", 0))
     if send_buffer is not None:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, send_buffer)
@@ -130,6 +132,7 @@ async def served(
                 fleet=fleet,
                 store=store,
                 own_fleet=own_fleet,
+                clock=clock,
             )
         )
         try:

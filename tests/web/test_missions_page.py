@@ -155,3 +155,29 @@ def test_a_flight_is_chosen_estimated_kept_flown_and_flown_on_and_places_become_
         expect(page.get_by_role("alert").filter(has_text=refused)).to_be_visible()
         assert hindrances(page) == []
         assert page.evaluate("document.documentElement.scrollWidth") <= NARROW[0]
+
+
+def test_a_schedule_is_kept_listed_suspended_and_deleted(browser: Browser, url: str) -> None:
+    with opened(browser, f"{url}/missions", NARROW) as page:
+        card = page.get_by_role("region", name="Schedules")
+        expect(card.get_by_text("Nothing starts by itself on this site")).to_be_visible()
+        card.get_by_role("button", name="New schedule").press("Enter")
+        card.get_by_label("Name").fill("Tuesdays")
+        card.get_by_role("button", name="Tue").press("Space")
+        card.get_by_label("Time zone").fill("Berlin")
+        card.get_by_role("button", name="Keep schedule").press("Enter")
+        expect(card.get_by_role("alert")).to_have_text(
+            re.compile("'Berlin' is no time zone that this machine")
+        )
+        assert hindrances(page) == []
+        card.get_by_label("Time zone").fill("Europe/Berlin")
+        card.get_by_role("button", name="Keep schedule").press("Enter")
+        expect(card.get_by_text("aisles A · Tue at 22:00, Europe/Berlin")).to_be_visible()
+        expect(card.get_by_text(re.compile("^next Tue"))).to_be_visible()
+        card.get_by_role("button", name="Suspend Tuesdays").press("Enter")
+        expect(card.get_by_text("suspended")).to_be_visible()
+        assert hindrances(page) == []
+        assert page.evaluate("document.documentElement.scrollWidth") <= NARROW[0]
+        card.get_by_role("button", name="Delete Tuesdays").press("Enter")
+        card.get_by_role("button", name="Delete Tuesdays for good").press("Enter")
+        expect(card.get_by_text("None yet.")).to_be_visible()

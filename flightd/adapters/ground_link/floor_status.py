@@ -53,6 +53,7 @@ def floor_status(site: Site) -> FloorStatus:
             for edge in site.edges
             if edge.one_way or site.is_closed(edge)
         ),
+        unattended_start=site.unattended_start,
     )
 
 

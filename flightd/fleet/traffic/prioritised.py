@@ -20,12 +20,16 @@ from flightd.fleet.traffic.motions import NEVER, MotionNet, vertex_of
 from flightd.fleet.traffic.plan import Plan, occupancy
 from flightd.fleet.traffic.reservations import ReservationTable
 from flightd.fleet.traffic.sipp import Effort, Sipp
+from flightd.fleet.traffic.steps import StepTable
 from flightd.fleet.traffic.tours import Request, plan_tour
 
 _RAISED_AT_MOST: Final = 4
+_START: Final = "start of "
+"""Before the name of a drone: the holder of the air in which it stands until it is planned."""
 WEIGHT: Final = 2.0
 """Of the estimate against the time flown (bounded-suboptimal SIPP, K. Yakovlev et al. 2020): a leg takes at
-most so much longer than the shortest one, and is found much sooner where many drones have to wait."""
+most so much longer than the shortest one that stops in no section but those of its ends, and is found much
+sooner where many drones have to wait."""
 STATES_FOR_ONE: Final = 20_000
 """States that the search for one drone may expand."""
 
@@ -55,6 +59,7 @@ class PrioritisedPlanner:
     def __init__(self, net: MotionNet, conflicts: Conflicts, weight: float = WEIGHT) -> None:
         self._net = net
         self._conflicts = conflicts
+        self._steps = StepTable(net)
         self.distances = Distances(net)
         self.weight = weight
 
@@ -78,13 +83,12 @@ class PrioritisedPlanner:
 
     def sipp(self, table: ReservationTable) -> Sipp:
         """A search in a table."""
-        return Sipp(self._net, self.distances, table, self.weight)
+        return Sipp(self._net, self.distances, table, self.weight, self._steps)
 
     def book(self, table: ReservationTable, request: Request, plan: Plan) -> None:
         """Take what a plan takes, the end of it for good."""
         place = vertex_of(request.configuration)
-        for resource, from_ms, to_ms in occupancy(plan.actions, place, request.at_ms, NEVER):
-            table.take(request.drone, resource, from_ms, to_ms)
+        table.take_all(request.drone, occupancy(plan.actions, place, request.at_ms, NEVER))
 
 
 class _Round:
@@ -106,19 +110,31 @@ class _Round:
         heapq.heapify(queue)
         ties = len(queue)
         without: list[str] = []
+        for drone in self._requests:
+            self._hold(drone)
         while queue:
             _, _, drone = heapq.heappop(queue)
+            self._shared.give_back(_START + drone)
             plan: Plan | None = self._try(drone, self._table_for(drone))
             if plan is None and self._raised[drone] < _RAISED_AT_MOST:
                 plan, displaced = self._raise(drone)
                 for other in displaced:
                     ties += 1
+                    self._hold(other)
                     heapq.heappush(queue, (self._rank[other], ties, other))
             if plan is None:
                 without.append(drone)
             else:
                 self._keep(drone, plan)
         return Planned(self._plans, tuple(without), self._states)
+
+    def _hold(self, drone: str) -> None:
+        """Keep the air in which a drone stands until it is planned, if it may stay there: so that those
+        before it shut it in nowhere."""
+        request = self._requests[drone]
+        place = vertex_of(request.configuration)
+        if place in request.ends:
+            self._shared.take(_START + drone, place, 0, NEVER)
 
     def _table_for(self, drone: str) -> ReservationTable:
         if drone not in self._fixed.closed_for:

@@ -19,7 +19,8 @@ FILE = "audit.jsonl"
 
 
 class StationEntry(msgspec.Struct, frozen=True):
-    """Who did what from where, and what came of it: `accepted`, or `refused` and why."""
+    """Who did what from where, and what came of it: `accepted`, or `refused` and why; a schedule's
+    run may be `missed`."""
 
     person: str
     role: str

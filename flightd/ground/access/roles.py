@@ -38,13 +38,13 @@ begins again.  Pause is among them so that a viewer's only way is not the hardes
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Who asks: by a password (`session` is the hash of its id), by a key, from this machine, or over a
-    fleet's broker.  With `scopes` (words of `key_book`) it is a program that may what these say and nothing
-    else, whatever the role."""
+    """Who asks: by a password (`session` is the hash of its id), by a key, from this machine, over a fleet's
+    broker, or a schedule of the station.  With `scopes` (words of `key_book`) it is a program that may what
+    these say and nothing else, whatever the role."""
 
     name: str
     role: Role
-    by: Literal["local", "password", "key", "mqtt"]
+    by: Literal["local", "password", "key", "mqtt", "schedule"]
     session: bytes = b""
     scopes: frozenset[str] | None = None
 

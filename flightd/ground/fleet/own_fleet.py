@@ -150,6 +150,10 @@ class OwnFleet:
             drone.taken_by_person(not to_manager)
         return drone is not None
 
+    def flies(self, name: str) -> bool:
+        """As `Managers`."""
+        return name in self._drones and not self._drones[name].is_taken
+
     def attach(self, wake: Callable[[], object] | None) -> None:
         """No pictures are wanted here."""
 

@@ -75,6 +75,16 @@ class MissionBook:
             rows = book.execute(_ALL, (site,)).fetchall()
             return [_mission(row) for row in rows]
 
+    def mission(self, mission_id: str) -> Mission:
+        """InputError where there is none."""
+        found = None
+        if self._database.file.exists():
+            with self._database.opened() as book:
+                found = _found(book, mission_id)
+        if found is None:
+            raise InputError("there is no such mission any more")
+        return found
+
     def keep(self, mission: Mission) -> Mission:
         """Keep a mission, in place of the one with its id; where its nodes change, nothing is left of the
         flight before.  RunError for a name that the site's missions have already."""

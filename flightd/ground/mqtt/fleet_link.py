@@ -185,6 +185,10 @@ class FleetLink:
         drone.taken_by_person(not to_manager)
         return True
 
+    def flies(self, name: str) -> bool:
+        """As `Managers`."""
+        return self._takes_orders and name in self._drones and not self._drones[name].is_taken
+
     def attach(self, wake: Callable[[], object] | None) -> None:
         """No pictures are wanted here."""
 

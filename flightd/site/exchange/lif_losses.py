@@ -15,7 +15,9 @@ from flightd.site.site_tables import SiteTablesError, site_of
 
 _SAME: Final = 1e-4
 """Metres by which the numbers of a LIF may differ from those of the site."""
-_OF_SITE: Final = ("name", "line_width_m", "line_colour", "ceiling_m", "ceiling_given", "interlock")
+_OF_SITE: Final = (
+    "name", "line_width_m", "line_colour", "ceiling_m", "ceiling_given", "interlock", "unattended_start",
+)  # fmt: skip
 
 
 def lif_losses(site: Site) -> tuple[str, ...]:

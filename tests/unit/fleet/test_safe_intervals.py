@@ -65,8 +65,14 @@ def nets(draw: st.DrawFn) -> TinyNet:
         if second:
             parts.append(Part(Act.FLY, lanes[1], b, first, duration))
         parts.append(Part(Act.FLY, b, b, first if second else 0, duration))
-        motion = Motion(at_rest(b, 0) + ends, duration, tuple(parts))
-        motions.setdefault(at_rest(a, 0) + begins, []).append(motion)
+        before, after = draw(st.tuples(st.integers(0, 1), st.integers(0, 1)))
+        motion = Motion(at_rest(b, after) + ends, duration, tuple(parts))
+        motions.setdefault(at_rest(a, before) + begins, []).append(motion)
+    for vertex, turn_ms in draw(st.dictionaries(st.integers(0, VERTICES - 1), st.integers(1, 6))).items():
+        for quarter in (0, 1):
+            turned = Part(Act.TURN, vertex, vertex, 0, turn_ms)
+            motion = Motion(at_rest(vertex, 1 - quarter), turn_ms, (turned,))
+            motions.setdefault(at_rest(vertex, quarter), []).append(motion)
     busy = draw(
         st.lists(
             st.tuples(st.integers(0, VERTICES + LANES - 1), st.integers(0, 20), st.integers(1, 10)),
@@ -86,7 +92,8 @@ def earliest_by_force(net: TinyNet, goal: int) -> int | None:
     if not any(r == 0 and a == 0 for r, a, _ in net.busy):
         reached[0].add(at_rest(0, 0))
     for moment in range(UNTIL_MS):
-        if at_rest(goal, 0) in reached[moment] and is_free(goal, moment, NEVER):
+        there = not reached[moment].isdisjoint((at_rest(goal, 0), at_rest(goal, 1)))
+        if there and is_free(goal, moment, NEVER):
             return moment
         for configuration in reached[moment]:
             if not configuration & 1 and is_free(configuration >> 3, moment, moment + 1):

@@ -107,7 +107,8 @@ def sites(draw: st.DrawFn) -> Site:
     offset = draw(st.sampled_from([[0.0, 0.0], [0.25, -0.3]]))
     tables: dict[str, Any] = {
         "site": {"name": "hall", **draw(st.sampled_from([{}, {"ceiling_m": 6.0}])),
-                 "line_width_m": draw(st.sampled_from([0.075, 0.06])), "interlock": draw(st.booleans())},
+                 "line_width_m": draw(st.sampled_from([0.075, 0.06])), "interlock": draw(st.booleans()),
+                 "unattended_start": draw(st.booleans())},
         "aisle": aisles,
         "cross": crosses,
         "rack": [rack] if shelved and racked else [],
@@ -147,11 +148,12 @@ def test_a_site_comes_back_from_lif_with_all_that_lif_can_hold(site: Site) -> No
     assert not [note for note in found.notes if "not held" in note or "left out" in note]
     told = {line.removeprefix("LIF does not hold ").partition(" ")[0] for line in lif_losses(site)}
     assert told <= {
-        "site.line_width_m", "site.interlock", "aisle.shelves", "aisle.shelf_height_m", "aisle.overrun_m",
-        "aisle.shelf_distance_m", "aisle.one_way", "pad.size_m", "keep_out", "rack", "site.ceiling_m",
-        "site.ceiling_given",
+        "site.line_width_m", "site.interlock", "site.unattended_start", "aisle.shelves",
+        "aisle.shelf_height_m", "aisle.overrun_m", "aisle.shelf_distance_m", "aisle.one_way", "pad.size_m",
+        "keep_out", "rack", "site.ceiling_m", "site.ceiling_given",
     }  # fmt: skip
     assert ("site.interlock" in told) == site.interlock
+    assert ("site.unattended_start" in told) == site.unattended_start
     if "rack" in told:  # codes of a single bay or place leave open which of the two they number
         assert any(again.locations[code].position != place.position for code, place in site.locations.items())
     if "aisle.one_way" in told:  # of an aisle that is closed from end to end LIF has no way at all

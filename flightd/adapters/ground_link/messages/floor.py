@@ -87,6 +87,9 @@ class FloorStatus(msgspec.Struct, frozen=True):
     keep_outs: Annotated[tuple[FloorArea, ...], Meta(description="every keep-out")] = ()
     pads: Annotated[tuple[FloorPad, ...], Meta(description="every pad")] = ()
     ways: Annotated[tuple[FloorWay, ...], Meta(description="closed and one-way lines")] = ()
+    unattended_start: Annotated[
+        bool, Meta(description="schedules of a ground station may start a flight without a person")
+    ] = False
 
 
 class CameraOptics(msgspec.Struct, frozen=True):

@@ -5,6 +5,7 @@
 * uPlot.js (μPlot)
 * A small, fast chart for time series, lines, areas, ohlc & bars
 * https://github.com/leeoniya/uPlot (v1.6.32)
+* Lines that are only comments are left out of this copy.
 */
 
 const FEAT_TIME          = true;
@@ -63,14 +64,11 @@ const nav = domEnv ? navigator : null;
 
 let pxRatio;
 
-//export const canHover = domEnv && !win.matchMedia('(hover: none)').matches;
-
 let query;
 
 function setPxRatio() {
 	let _pxRatio = devicePixelRatio;
 
-	// during print preview, Chrome fires off these dppx queries even without changes
 	if (pxRatio != _pxRatio) {
 		pxRatio = _pxRatio;
 
@@ -172,7 +170,6 @@ function off(ev, el, cb, capt) {
 
 domEnv && setPxRatio();
 
-// binary search for index of closest value
 function closestIdx(num, arr, lo, hi) {
 	let mid;
 	lo = lo || 0;
@@ -226,7 +223,6 @@ const nonNullIdxs = makeIndexOfs(notNullish);
 const positiveIdxs = makeIndexOfs(isPositive);
 
 function getMinMax(data, _i0, _i1, sorted = 0, log = false) {
-//	console.log("getMinMax()");
 
 	let getEdgeIdxs = log ? positiveIdxs : nonNullIdxs;
 	let predicate = log ? isPositive : notNullish;
@@ -288,7 +284,6 @@ function rangeLog(min, max, base, fullMags) {
 	let minIncr = pow(base, minExp);
 	let maxIncr = pow(base, maxExp);
 
-	// fix values like Math.pow(10, -5) === 0.000009999999999999999
 	if (base == 10) {
 		if (minExp < 0)
 			minIncr = roundDec(minIncr, -minExp);
@@ -338,8 +333,6 @@ const _eqRange = {
 	max: _eqRangePart,
 };
 
-// this ensures that non-temporal/numeric y-axes get multiple-snapped padding added above/below
-// TODO: also account for incrs when snapping to ensure top of axis gets a tick & value
 function rangeNum(_min, _max, mult, extra) {
 	if (isObj(mult))
 		return _rangeNum(_min, _max, mult);
@@ -351,13 +344,10 @@ function rangeNum(_min, _max, mult, extra) {
 	return _rangeNum(_min, _max, _eqRange);
 }
 
-// nullish coalesce
 function ifNull(lh, rh) {
 	return lh == null ? rh : lh;
 }
 
-// checks if given index range in an array contains a non-null value
-// aka a range-bounded Array.some()
 function hasData(data, idx0, idx1) {
 	idx0 = ifNull(idx0, 0);
 	idx1 = ifNull(idx1, data.length - 1);
@@ -395,18 +385,9 @@ function _rangeNum(_min, _max, cfg) {
 
 	let scalarMagDelta = abs(scalarMag - deltaMag);
 
-	// this handles situations like 89.7, 89.69999999999999
-	// by assuming 0.001x deltas are precision errors
-//	if (delta > 0 && delta < abs(_max) / 1e3)
-//		delta = 0;
-
-	// treat data as flat if delta is less than 1e-24
-	// or range is 11+ orders of magnitude below raw values, e.g. 99999999.99999996 - 100000000.00000004
 	if (delta < 1e-24 || scalarMagDelta > 10) {
 		delta = 0;
 
-		// if soft mode is 2 and all vals are flat at 0, avoid the 0.1 * 1e3 fallback
-		// this prevents 0,0,0 from ranging to -100,100 when softMin/softMax are -1,1
 		if (_min == 0 || _max == 0) {
 			delta = 1e-24;
 
@@ -438,7 +419,6 @@ function _rangeNum(_min, _max, cfg) {
 	return [minLim, maxLim];
 }
 
-// alternative: https://stackoverflow.com/a/2254896
 const numFormatter = new Intl.NumberFormat(domEnv ? nav.language : 'en-US');
 const fmtNum = val => numFormatter.format(val);
 
@@ -455,7 +435,6 @@ const pow = M.pow;
 const sign = M.sign;
 const log10 = M.log10;
 const log2 = M.log2;
-// TODO: seems like this needs to match asinh impl if the passed v is tweaked?
 const sinh =  (v, linthresh = 1) => M.sinh(v) * linthresh;
 const asinh = (v, linthresh = 1) => M.asinh(v / linthresh);
 
@@ -479,8 +458,6 @@ function fnOrSelf(v) {
 
 const noop = () => {};
 
-// note: these identity fns may get deoptimized if reused for different arg types
-// a TS version would enforce they stay monotyped and require making variants
 const retArg0 = _0 => _0;
 
 const retArg1 = (_0, _1) => _1;
@@ -493,7 +470,6 @@ const retEq = (a, b) => a == b;
 
 const regex6 = /\.\d*?(?=9{6,}|0{6,})/gm;
 
-// e.g. 17999.204999999998 -> 17999.205
 const fixFloat = val => {
 	if (isInt(val) || fixedDec.has(val))
 		return val;
@@ -507,7 +483,6 @@ const fixFloat = val => {
 
 	let len = match[0].length - 1;
 
-	// e.g. 1.0000000000000001e-24
 	if (str.indexOf('e-') != -1) {
 		let [num, exp] = str.split('e');
 		return +`${fixFloat(num)}e${exp}`;
@@ -528,13 +503,9 @@ function incrRoundDn(num, incr) {
 	return fixFloat(floor(fixFloat(num/incr))*incr);
 }
 
-// https://stackoverflow.com/a/48764436
-// rounds half away from zero
 function roundDec(val, dec = 0) {
 	if (isInt(val))
 		return val;
-//	else if (dec == 0)
-//		return round(val);
 
 	let p = 10 ** dec;
 	let n = (val * p) * (1 + Number.EPSILON);
@@ -567,8 +538,6 @@ function genIncrs(base, minExp, maxExp, mults) {
 
 	return incrs;
 }
-
-//export const assign = Object.assign;
 
 const EMPTY_OBJ = {};
 const EMPTY_ARR = [];
@@ -650,12 +619,10 @@ function assign(targ) {
 	return targ;
 }
 
-// nullModes
 const NULL_REMOVE = 0;  // nulls are converted to undefined (e.g. for spanGaps: true)
 const NULL_RETAIN = 1;  // nulls are retained, with alignment artifacts set to undefined (default)
 const NULL_EXPAND = 2;  // nulls are expanded to include any adjacent alignment artifacts
 
-// sets undefined values to nulls when adjacent to existing nulls (minesweeper)
 function nullExpand(yVals, nullIdxs, alignedLen) {
 	for (let i = 0, xi, lastNullIdx = -1; i < nullIdxs.length; i++) {
 		let nullIdx = nullIdxs[i];
@@ -672,11 +639,8 @@ function nullExpand(yVals, nullIdxs, alignedLen) {
 	}
 }
 
-// nullModes is a tables-matched array indicating how to treat nulls in each series
-// output is sorted ASC on the joined field (table[0]) and duplicate join values are collapsed
 function join(tables, nullModes) {
 	if (allHeadersSame(tables)) {
-	//	console.log('cheap join!');
 
 		let table = tables[0].slice();
 
@@ -749,7 +713,6 @@ function join(tables, nullModes) {
 
 const microTask = typeof queueMicrotask == "undefined" ? fn => Promise.resolve().then(fn) : queueMicrotask;
 
-// TODO: https://github.com/dy/sort-ids (~2x faster for 1e5+ arrays)
 function sortCols(table) {
 	let head = table[0];
 	let rlen = head.length;
@@ -774,7 +737,6 @@ function sortCols(table) {
 	return table2;
 }
 
-// test if we can do cheap join (all join fields same)
 function allHeadersSame(tables) {
 	let vals0 = tables[0][0];
 	let len0 = vals0.length;
@@ -799,11 +761,9 @@ function allHeadersSame(tables) {
 function isAsc(vals, samples = 100) {
 	const len = vals.length;
 
-	// empty or single value
 	if (len <= 1)
 		return true;
 
-	// skip leading & trailing nullish
 	let firstIdx = 0;
 	let lastIdx = len - 1;
 
@@ -813,7 +773,6 @@ function isAsc(vals, samples = 100) {
 	while (lastIdx >= firstIdx && vals[lastIdx] == null)
 		lastIdx--;
 
-	// all nullish or one value surrounded by nullish
 	if (lastIdx <= firstIdx)
 		return true;
 
@@ -894,47 +853,26 @@ function suffix(int) {
 */
 
 const subs = {
-	// 2019
 	YYYY:	d => d.getFullYear(),
-	// 19
 	YY:		d => (d.getFullYear()+'').slice(2),
-	// July
 	MMMM:	(d, names) => names.MMMM[d.getMonth()],
-	// Jul
 	MMM:	(d, names) => names.MMM[d.getMonth()],
-	// 07
 	MM:		d => zeroPad2(d.getMonth()+1),
-	// 7
 	M:		d => d.getMonth()+1,
-	// 09
 	DD:		d => zeroPad2(d.getDate()),
-	// 9
 	D:		d => d.getDate(),
-	// Monday
 	WWWW:	(d, names) => names.WWWW[d.getDay()],
-	// Mon
 	WWW:	(d, names) => names.WWW[d.getDay()],
-	// 03
 	HH:		d => zeroPad2(d.getHours()),
-	// 3
 	H:		d => d.getHours(),
-	// 9 (12hr, unpadded)
 	h:		d => {let h = d.getHours(); return h == 0 ? 12 : h > 12 ? h - 12 : h;},
-	// AM
 	AA:		d => d.getHours() >= 12 ? 'PM' : 'AM',
-	// am
 	aa:		d => d.getHours() >= 12 ? 'pm' : 'am',
-	// a
 	a:		d => d.getHours() >= 12 ? 'p' : 'a',
-	// 09
 	mm:		d => zeroPad2(d.getMinutes()),
-	// 9
 	m:		d => d.getMinutes(),
-	// 09
 	ss:		d => zeroPad2(d.getSeconds()),
-	// 9
 	s:		d => d.getSeconds(),
-	// 374
 	fff:	d => zeroPad3(d.getMilliseconds()),
 };
 
@@ -959,11 +897,9 @@ function fmtDate(tpl, names) {
 
 const localTz = new Intl.DateTimeFormat().resolvedOptions().timeZone;
 
-// https://stackoverflow.com/questions/15141762/how-to-initialize-a-javascript-date-to-a-particular-time-zone/53652131#53652131
 function tzDate(date, tz) {
 	let date2;
 
-	// perf optimization
 	if (tz == 'UTC' || tz == 'Etc/UTC')
 		date2 = new Date(+date + date.getTimezoneOffset() * 6e4);
 	else if (tz == localTz)
@@ -976,21 +912,14 @@ function tzDate(date, tz) {
 	return date2;
 }
 
-//export const series = [];
-
-// default formatters:
-
 const onlyWhole = v => v % 1 == 0;
 
 const allMults = [1,2,2.5,5];
 
-// ...0.01, 0.02, 0.025, 0.05, 0.1, 0.2, 0.25, 0.5
 const decIncrs = genIncrs(10, -32, 0, allMults);
 
-// 1, 2, 2.5, 5, 10, 20, 25, 50...
 const oneIncrs = genIncrs(10, 0, 32, allMults);
 
-// 1, 2,      5, 10, 20, 25, 50...
 const wholeIncrs = oneIncrs.filter(onlyWhole);
 
 const numIncrs = decIncrs.concat(oneIncrs);
@@ -1019,23 +948,19 @@ function genTimeStuffs(ms) {
 		mo = d  * 30,
 		y  = d  * 365;
 
-	// min of 1e-3 prevents setting a temporal x ticks too small since Date objects cannot advance ticks smaller than 1ms
 	let subSecIncrs = ms == 1 ? genIncrs(10, 0, 3, allMults).filter(onlyWhole) : genIncrs(10, -3, 0, allMults);
 
 	let timeIncrs = subSecIncrs.concat([
-		// minute divisors (# of secs)
 		s,
 		s * 5,
 		s * 10,
 		s * 15,
 		s * 30,
-		// hour divisors (# of mins)
 		m,
 		m * 5,
 		m * 10,
 		m * 15,
 		m * 30,
-		// day divisors (# of hrs)
 		h,
 		h * 2,
 		h * 3,
@@ -1043,7 +968,6 @@ function genTimeStuffs(ms) {
 		h * 6,
 		h * 8,
 		h * 12,
-		// month divisors TODO: need more?
 		d,
 		d * 2,
 		d * 3,
@@ -1055,13 +979,11 @@ function genTimeStuffs(ms) {
 		d * 9,
 		d * 10,
 		d * 15,
-		// year divisors (# months, approx)
 		mo,
 		mo * 2,
 		mo * 3,
 		mo * 4,
 		mo * 6,
-		// century divisors
 		y,
 		y * 2,
 		y * 5,
@@ -1071,12 +993,7 @@ function genTimeStuffs(ms) {
 		y * 100,
 	]);
 
-	// [0]:   minimum num secs in the tick incr
-	// [1]:   default tick format
-	// [2-7]: rollover tick formats
-	// [8]:   mode: 0: replace [1] -> [2-7], 1: concat [1] + [2-7]
 	const _timeAxisStamps = [
-	//   tick incr    default          year                    month   day                   hour    min       sec   mode
 		[y,           yyyy,            _,                      _,      _,                    _,      _,        _,       1],
 		[d * 28,      "{MMM}",         NLyyyy,                 _,      _,                    _,      _,        _,       1],
 		[d,           md,              NLyyyy,                 _,      _,                    _,      _,        _,       1],
@@ -1086,28 +1003,21 @@ function genTimeStuffs(ms) {
 		[ms,          ss + ".{fff}",   NLmdyy + " " + hmmaa,   _,      NLmd + " " + hmmaa,   _,      NLhmmaa,  _,       1],
 	];
 
-	// the ensures that axis ticks, values & grid are aligned to logical temporal breakpoints and not an arbitrary timestamp
-	// https://www.timeanddate.com/time/dst/
-	// https://www.timeanddate.com/time/dst/2019.html
-	// https://www.epochconverter.com/timezones
 	function timeAxisSplits(tzDate) {
 		return (self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace) => {
 			let splits = [];
 			let isYr = foundIncr >= y;
 			let isMo = foundIncr >= mo && foundIncr < y;
 
-			// get the timezone-adjusted date
 			let minDate = tzDate(scaleMin);
 			let minDateTs = roundDec(minDate * ms, 3);
 
-			// get ts of 12am (this lands us at or before the original scaleMin)
 			let minMin = mkDate(minDate.getFullYear(), isYr ? 0 : minDate.getMonth(), isMo || isYr ? 1 : minDate.getDate());
 			let minMinTs = roundDec(minMin * ms, 3);
 
 			if (isMo || isYr) {
 				let moIncr = isMo ? foundIncr / mo : 0;
 				let yrIncr = isYr ? foundIncr / y  : 0;
-			//	let tzOffset = scaleMin - minDateTs;		// needed?
 				let split = minDateTs == minMinTs ? minDateTs : roundDec(mkDate(minMin.getFullYear() + yrIncr, minMin.getMonth() + moIncr, 1) * ms, 3);
 				let splitDate = new Date(round(split / ms));
 				let baseYear = splitDate.getFullYear();
@@ -1157,7 +1067,6 @@ function genTimeStuffs(ms) {
 
 						prevHour = (prevHour + incrHours) % 24;
 
-						// add a tick only if it's further than 70% of the min allowed label spacing
 						let prevSplit = splits[splits.length - 1];
 						let pctIncr = roundDec((split - prevSplit) / foundIncr, 3);
 
@@ -1183,7 +1092,6 @@ function genTimeStuffs(ms) {
 const [ timeIncrsMs, _timeAxisStampsMs, timeAxisSplitsMs ] = genTimeStuffs(1);
 const [ timeIncrsS,  _timeAxisStampsS,  timeAxisSplitsS  ] = genTimeStuffs(1e-3);
 
-// base 2
 genIncrs(2, -53, 53, [1]);
 
 /*
@@ -1203,13 +1111,10 @@ function timeAxisStamps(stampCfg, fmtDate) {
 	));
 }
 
-// TODO: will need to accept spaces[] and pull incr into the loop when grid will be non-uniform, eg for log scales.
-// currently we ignore this for months since they're *nearly* uniform and the added complexity is not worth it
 function timeAxisVals(tzDate, stamps) {
 	return (self, splits, axisIdx, foundSpace, foundIncr) => {
 		let s = stamps.find(s => foundIncr >= s[0]) || stamps[stamps.length - 1];
 
-		// these track boundaries when a full label is needed again
 		let prevYear;
 		let prevMnth;
 		let prevDate;
@@ -1249,7 +1154,6 @@ function timeAxisVals(tzDate, stamps) {
 	}
 }
 
-// for when axis.values is defined as a static fmtDate template string
 function timeAxisVal(tzDate, dateTpl) {
 	let stamp = fmtDate(dateTpl);
 	return (self, splits, axisIdx, foundSpace, foundIncr) => splits.map(split => stamp(tzDate(split)));
@@ -1381,7 +1285,6 @@ const cursorOpts = {
 		dist: 0,
 		uni: null,
 		click: (self, e) => {
-		//	e.preventDefault();
 			e.stopPropagation();
 			e.stopImmediatePropagation();
 		},
@@ -1414,7 +1317,6 @@ const axisLines = {
 	show: true,
 	stroke: "rgba(0,0,0,0.07)",
 	width: 2,
-//	dash: [],
 };
 
 const grid = assign({}, axisLines, {
@@ -1445,10 +1347,6 @@ const xAxisOpts = {
 	labelSize: 30,
 	labelFont,
 	side: 2,
-//	class: "x-vals",
-//	incrs: timeIncrs,
-//	values: timeVals,
-//	filter: retArg1,
 	grid,
 	ticks,
 	border,
@@ -1465,10 +1363,7 @@ const xSeriesOpts = {
 	scale: "x",
 	auto: false,
 	sorted: 1,
-//	label: "Time",
-//	value: v => stamp(new Date(v * 1e3)),
 
-	// internal caches
 	min: inf,
 	max: -inf,
 	idxs: [],
@@ -1491,7 +1386,6 @@ function numAxisSplits(self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace,
 	return splits;
 }
 
-// this doesnt work for sin, which needs to come off from 0 independently in pos and neg dirs
 function logAxisSplits(self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace, forceMin) {
 	const splits = [];
 
@@ -1503,8 +1397,6 @@ function logAxisSplits(self, axisIdx, scaleMin, scaleMax, foundIncr, foundSpace,
 
 	foundIncr = pow(logBase, exp);
 
-	// boo: 10 ** -24 === 1.0000000000000001e-24
-	// this grabs the proper 1e-24 one
 	if (logBase == 10)
 		foundIncr = numIncrs[closestIdx(foundIncr, numIncrs)];
 
@@ -1556,9 +1448,6 @@ function log10AxisValsFilt(self, splits, axisIdx, foundSpace, foundIncr) {
 	let axis = self.axes[axisIdx];
 	let scaleKey = axis.scale;
 	let sc = self.scales[scaleKey];
-
-//	if (sc.distr == 3 && sc.log == 2)
-//		return splits;
 
 	let valToPos = self.valToPos;
 
@@ -1613,10 +1502,6 @@ const yAxisOpts = {
 	labelSize: 30,
 	labelFont,
 	side: 3,
-//	class: "y-vals",
-//	incrs: numIncrs,
-//	values: (vals, space) => vals,
-//	filter: retArg1,
 	grid,
 	ticks,
 	border,
@@ -1625,7 +1510,6 @@ const yAxisOpts = {
 	rotate: 0,
 };
 
-// takes stroke width
 function ptDia(width, mult) {
 	let dia = 3 + (width || 1) * 2;
 	return roundDec(dia * mult, 3);
@@ -1639,7 +1523,6 @@ function seriesPointsShow(self, si) {
 	let dim = abs(p1 - p0);
 
 	let s = self.series[si];
-//	const dia = ptDia(s.width, pxRatio);
 	let maxPts = dim / (s.points.space * pxRatio);
 	return idxs[1] - idxs[0] <= maxPts;
 }
@@ -1649,7 +1532,6 @@ const facet = {
 	auto: true,
 	sorted: 0,
 
-	// internal caches
 	min: inf,
 	max: -inf,
 };
@@ -1679,17 +1561,9 @@ const ySeriesOpts = {
 	points: {
 		show: seriesPointsShow,
 		filter: null,
-	//  paths:
-	//	stroke: "#000",
-	//	fill: "#fff",
-	//	width: 1,
-	//	size: 10,
 	},
-//	label: "Value",
-//	value: v => v,
 	values: null,
 
-	// internal caches
 	min: inf,
 	max: -inf,
 	idxs: [],
@@ -1819,7 +1693,6 @@ function orient(u, seriesIdx, cb) {
 function bandFillClipDirs(self, seriesIdx) {
 	let fillDir = 0;
 
-	// 2 bits, -1 | 1
 	let clipDirs = 0;
 
 	let bands = ifNull(self.bands, EMPTY_ARR);
@@ -1827,10 +1700,8 @@ function bandFillClipDirs(self, seriesIdx) {
 	for (let i = 0; i < bands.length; i++) {
 		let b = bands[i];
 
-		// is a "from" band edge
 		if (b.series[0] == seriesIdx)
 			fillDir = b.dir;
-		// is a "to" band edge
 		else if (b.series[1] == seriesIdx) {
 			if (b.dir == 1)
 				clipDirs |= 1;
@@ -1866,9 +1737,6 @@ function seriesFillTo(self, seriesIdx, dataMin, dataMax, bandFillDir) {
 	);
 }
 
-// creates inverted band clip path (from stroke path -> yMax || yMin)
-// clipDir is always inverse of fillDir
-// default clip dir is upwards (1), since default band fill is downwards/fillBelowTo (-1) (highIdx -> lowIdx)
 function clipBandLine(self, seriesIdx, idx0, idx1, strokePath, clipDir) {
 	return orient(self, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
 		let pxRound = series.pxRound;
@@ -1887,12 +1755,9 @@ function clipBandLine(self, seriesIdx, idx0, idx1, strokePath, clipDir) {
 			toIdx = idx0;
 		}
 
-		// path start
 		let x0 = pxRound(valToPosX(dataX[frIdx], scaleX, xDim, xOff));
 		let y0 = pxRound(valToPosY(dataY[frIdx], scaleY, yDim, yOff));
-		// path end x
 		let x1 = pxRound(valToPosX(dataX[toIdx], scaleX, xDim, xOff));
-		// upper or lower y limit
 		let yLimit = pxRound(valToPosY(clipDir == 1 ? scaleY.max : scaleY.min, scaleY, yDim, yOff));
 
 		let clip = new Path2D(strokePath);
@@ -1908,7 +1773,6 @@ function clipBandLine(self, seriesIdx, idx0, idx1, strokePath, clipDir) {
 function clipGaps(gaps, ori, plotLft, plotTop, plotWid, plotHgt) {
 	let clip = null;
 
-	// create clip path (invert gaps and non-gaps)
 	if (gaps.length > 0) {
 		clip = new Path2D();
 
@@ -1930,7 +1794,6 @@ function clipGaps(gaps, ori, plotLft, plotTop, plotWid, plotHgt) {
 
 		let w = plotLft + plotWid - prevGapEnd;
 
-		// hack to ensure we expand the clip enough to avoid cutting off strokes at edges
 		let maxStrokeWidth = 10;
 
 		w > 0 && rect(clip, prevGapEnd, plotTop - maxStrokeWidth / 2, w, plotTop + plotHgt + maxStrokeWidth);
@@ -1970,20 +1833,12 @@ function findGaps(xs, ys, idx0, idx1, dir, pixelForX, align) {
 			let frPx = pixelForX(xs[fr]);
 			let toPx = to == fr ? frPx : pixelForX(xs[to]);
 
-			// if value adjacent to edge null is same pixel, then it's partially
-			// filled and gap should start at next pixel
 			let fri2 = fr - dir;
 			let frPx2 = align <= 0 && fri2 >= 0 && fri2 < len ? pixelForX(xs[fri2]) : frPx;
-		//	if (frPx2 == frPx)
-		//		frPx++;
-		//	else
 				frPx = frPx2;
 
 			let toi2 = to + dir;
 			let toPx2 = align >= 0 && toi2 >= 0 && toi2 < len ? pixelForX(xs[toi2]) : toPx;
-		//	if (toPx2 == toPx)
-		//		toPx--;
-		//	else
 				toPx = toPx2;
 
 			if (toPx >= frPx)
@@ -2024,7 +1879,6 @@ function rect(ori) {
 		(p, x, y, w, h) => { p.rect(x, y, w, h); } :
 		(p, y, x, h, w) => { p.rect(x, y, w, h); };
 
-	// TODO (pending better browser support): https://developer.mozilla.org/en-US/docs/Web/API/CanvasRenderingContext2D/roundRect
 	return (p, x, y, w, h, endRad = 0, baseRad = 0) => {
 		if (endRad == 0 && baseRad == 0)
 			rect(p, x, y, w, h);
@@ -2032,7 +1886,6 @@ function rect(ori) {
 			endRad  = min(endRad,  w / 2, h / 2);
 			baseRad = min(baseRad, w / 2, h / 2);
 
-			// adapted from https://stackoverflow.com/questions/1255512/how-to-draw-a-rounded-rectangle-using-html-canvas/7838871#7838871
 			moveTo(p, x + endRad, y);
 			arcTo(p, x + w, y, x + w, y + h, endRad);
 			arcTo(p, x + w, y + h, x, y + h, baseRad);
@@ -2043,7 +1896,6 @@ function rect(ori) {
 	};
 }
 
-// orientation-inverting canvas functions
 const moveToH = (p, x, y) => { p.moveTo(x, y); };
 const moveToV = (p, y, x) => { p.moveTo(x, y); };
 const lineToH = (p, x, y) => { p.lineTo(x, y); };
@@ -2055,10 +1907,8 @@ const arcV = (p, y, x, r, startAngle, endAngle) => { p.arc(x, y, r, startAngle, 
 const bezierCurveToH = (p, bp1x, bp1y, bp2x, bp2y, p2x, p2y) => { p.bezierCurveTo(bp1x, bp1y, bp2x, bp2y, p2x, p2y); };
 const bezierCurveToV = (p, bp1y, bp1x, bp2y, bp2x, p2y, p2x) => { p.bezierCurveTo(bp1x, bp1y, bp2x, bp2y, p2x, p2y); };
 
-// TODO: drawWrap(seriesIdx, drawPoints) (save, restore, translate, clip)
 function points(opts) {
 	return (u, seriesIdx, idx0, idx1, filtIdxs) => {
-	//	log("drawPoints()", arguments);
 
 		return orient(u, seriesIdx, (series, dataX, dataY, scaleX, scaleY, valToPosX, valToPosY, xOff, yOff, xDim, yDim) => {
 			let { pxRound, points } = series;
@@ -2164,7 +2014,6 @@ function linear(opts) {
 
 			let hasGap = false;
 
-			// decimate when number of points >= 4x available pixels
 			const decimate = idx1 - idx0 >= xDim * 4;
 
 			if (decimate) {
@@ -2179,7 +2028,6 @@ function linear(opts) {
 				let idx0px = pixelForX(dataX[idx0]);
 				let idx1px = pixelForX(dataX[idx1]);
 
-				// tracks limit of current x bucket to avoid having to get x pixel for every x value
 				let nextAccXVal = xForPixel(dir == 1 ? idx0px + 1 : idx1px - 1);
 
 				for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
@@ -2262,14 +2110,9 @@ function linear(opts) {
 			}
 
 			if (!series.spanGaps) { // skip in mode: 2?
-			//	console.time('gaps');
 				let gaps = [];
 
 				hasGap && gaps.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
-
-			//	console.timeEnd('gaps');
-
-			//	console.log('gaps', JSON.stringify(gaps));
 
 				_paths.gaps = gaps = series.gaps(u, seriesIdx, idx0, idx1, gaps);
 
@@ -2288,10 +2131,8 @@ function linear(opts) {
 	};
 }
 
-// BUG: align: -1 behaves like align: 1 when scale.dir: -1
 function stepped(opts) {
 	const align = ifNull(opts.align, 1);
-	// whether to draw ascenders/descenders at null/gap bondaries
 	const ascDesc = ifNull(opts.ascDesc, false);
 	const alignGaps = ifNull(opts.alignGaps, 0);
 	const extend = ifNull(opts.extend, false);
@@ -2367,16 +2208,10 @@ function stepped(opts) {
 			}
 
 			if (!series.spanGaps) {
-			//	console.time('gaps');
 				let gaps = [];
 
 				gaps.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
 
-			//	console.timeEnd('gaps');
-
-			//	console.log('gaps', JSON.stringify(gaps));
-
-				// expand/contract clips for ascenders/descenders
 				let halfStroke = (series.width * pxRatio) / 2;
 				let startsOffset = (ascDesc || align ==  1) ?  halfStroke : -halfStroke;
 				let endsOffset   = (ascDesc || align == -1) ? -halfStroke :  halfStroke;
@@ -2405,11 +2240,8 @@ function stepped(opts) {
 
 function findColWidth(dataX, dataY, valToPosX, scaleX, xDim, xOff, colWid = inf) {
 	if (dataX.length > 1) {
-		// prior index with non-undefined y data
 		let prevIdx = null;
 
-		// scan full dataset for smallest adjacent delta
-		// will not work properly for non-linear x scales, since does not do expensive valToPosX calcs till end
 		for (let i = 0, minDelta = Infinity; i < dataX.length; i++) {
 			if (dataY[i] !== undefined) {
 				if (prevIdx != null) {
@@ -2438,7 +2270,6 @@ function bars(opts) {
 	let ro = opts.radius;
 
 	ro =
-		// [valueRadius, baselineRadius]
 		ro == null ? [0, 0] :
 		typeof ro == 'number' ? [ro, 0] : ro;
 
@@ -2470,7 +2301,6 @@ function bars(opts) {
 				[baseRadius, valRadius] = radiusFn(u, seriesIdx);
 
 			const _dirX = scaleX.dir * (scaleX.ori == 0 ? 1 : -1);
-		//	const _dirY = scaleY.dir * (scaleY.ori == 1 ? 1 : -1);
 
 			let rect = scaleX.ori == 0 ? rectH : rectV;
 
@@ -2478,14 +2308,12 @@ function bars(opts) {
 				_each(u, seriesIdx, i, lft, top, wid, hgt);
 			};
 
-			// band where this series is the "from" edge
 			let band = ifNull(u.bands, EMPTY_ARR).find(b => b.series[0] == seriesIdx);
 
 			let fillDir = band != null ? band.dir : 0;
 			let fillTo = series.fillTo(u, seriesIdx, series.min, series.max, fillDir);
 			let fillToY = pxRound(valToPosY(fillTo, scaleY, yDim, yOff));
 
-			// barWid is to center of stroke
 			let xShift, barWid, fullGap, colWid = xDim;
 
 			let strokeWidth = pxRound(series.width * pxRatio);
@@ -2526,7 +2354,6 @@ function bars(opts) {
 				if (x0.unit == 2)
 					dataX = dataX.map(pct => u.posToVal(xOff + pct * xDim, scaleX.key, true));
 
-				// assumes uniform sizes, for now
 				let sizes = size.values(u, seriesIdx, idx0, idx1);
 
 				if (size.unit == 2)
@@ -2554,7 +2381,6 @@ function bars(opts) {
 			if (strokeWidth >= barWid / 2)
 				strokeWidth = 0;
 
-			// for small gaps, disable pixel snapping since gap inconsistencies become noticible and annoying
 			if (fullGap < 5)
 				pxRound = retArg0;
 
@@ -2565,7 +2391,6 @@ function bars(opts) {
 			barWid = pxRound(clamp(rawBarWid, minWidth, maxWidth));
 
 			xShift = (_align == 0 ? barWid / 2 : _align == _dirX ? 0 : barWid) - _align * _dirX * ((_align == 0 ? extraGap / 2 : 0) + (insetStroke ? strokeWidth / 2 : 0));
-
 
 			const _paths = {stroke: null, fill: null, clip: null, band: null, gaps: null, flags: 0};  // disp, geom
 
@@ -2604,14 +2429,12 @@ function bars(opts) {
 
 				let xVal = scaleX.distr != 2 || disp != null ? dataX[i] : i;
 
-				// TODO: all xPos can be pre-computed once for all series in aligned set
 				let xPos = valToPosX(xVal, scaleX, xDim, xOff);
 				let yPos = valToPosY(ifNull(yVal, fillTo), scaleY, yDim, yOff);
 
 				let lft = pxRound(xPos - xShift);
 				let btm = pxRound(max(yPos, fillToY));
 				let top = pxRound(min(yPos, fillToY));
-				// this includes the stroke
 				let barHgt = btm - top;
 
 				if (yVal != null) {  // && yVal != fillTo (0 height bar)
@@ -2712,14 +2535,9 @@ function splineInterp(interp, opts) {
 			}
 
 			if (!series.spanGaps) {
-			//	console.time('gaps');
 				let gaps = [];
 
 				gaps.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
-
-			//	console.timeEnd('gaps');
-
-			//	console.log('gaps', JSON.stringify(gaps));
 
 				_paths.gaps = gaps = series.gaps(u, seriesIdx, idx0, idx1, gaps);
 
@@ -2735,17 +2553,6 @@ function splineInterp(interp, opts) {
 
 			return _paths;
 
-			//  if FEAT_PATHS: false in rollup.config.js
-			//	u.ctx.save();
-			//	u.ctx.beginPath();
-			//	u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
-			//	u.ctx.clip();
-			//	u.ctx.strokeStyle = u.series[sidx].stroke;
-			//	u.ctx.stroke(stroke);
-			//	u.ctx.fillStyle = u.series[sidx].fill;
-			//	u.ctx.fill(fill);
-			//	u.ctx.restore();
-			//	return null;
 		});
 	};
 }
@@ -2754,8 +2561,6 @@ function monotoneCubic(opts) {
 	return splineInterp(_monotoneCubic, opts);
 }
 
-// Monotone Cubic Spline interpolation, adapted from the Chartist.js implementation:
-// https://github.com/gionkunz/chartist-js/blob/e7e78201bffe9609915e5e53cfafa29a5d6c49f9/src/scripts/interpolation.js#L240-L369
 function _monotoneCubic(xs, ys, moveTo, lineTo, bezierCurveTo, pxRound) {
 	const n = xs.length;
 
@@ -2774,15 +2579,12 @@ function _monotoneCubic(xs, ys, moveTo, lineTo, bezierCurveTo, pxRound) {
 			dys = Array(n - 1),
 			dxs = Array(n - 1);
 
-		// calc deltas and derivative
 		for (let i = 0; i < n - 1; i++) {
 			dys[i] = ys[i + 1] - ys[i];
 			dxs[i] = xs[i + 1] - xs[i];
 			ds[i]  = dys[i] / dxs[i];
 		}
 
-		// determine desired slope (m) at each point using Fritsch-Carlson method
-		// http://math.stackexchange.com/questions/45218/implementation-of-monotone-cubic-interpolation
 		ms[0] = ds[0];
 
 		for (let i = 1; i < n - 1; i++) {
@@ -2852,8 +2654,6 @@ function snapNumX(self, dataMin, dataMax) {
 
 const snapTimeX = snapNumX;
 
-// this ensures that non-temporal/numeric y-axes get multiple-snapped padding added above/below
-// TODO: also account for incrs when snapping to ensure top of axis gets a tick & value
 function snapNumY(self, dataMin, dataMax) {
 	return dataMin == null ? nullNullTuple : rangeNum(dataMin, dataMax, rangePad, true);
 }
@@ -2870,7 +2670,6 @@ function snapAsinhY(self, dataMin, dataMax, scale) {
 
 const snapAsinhX = snapAsinhY;
 
-// dim is logical (getClientBoundingRect) pixels, not canvas pixels
 function findIncr(minVal, maxVal, incrs, dim, minSpace) {
 	let intDigits = max(numIntDigits(minVal), numIntDigits(maxVal));
 
@@ -3017,9 +2816,7 @@ function uPlot(opts, data, then) {
 			let scaleOpts = (opts.scales || EMPTY_OBJ)[scaleKey] || EMPTY_OBJ;
 
 			if (scaleOpts.from != null) {
-				// ensure parent is initialized
 				initScale(scaleOpts.from);
-				// dependent scales inherit
 				let sc = assign({}, scales[scaleOpts.from], scaleOpts, {key: scaleKey});
 				sc.valToPct = initValToPct(sc);
 				scales[scaleKey] = sc;
@@ -3036,7 +2833,6 @@ function uPlot(opts, data, then) {
 				let rangeIsArr = isArr(rn);
 
 				if (scaleKey != xScaleKey || (mode == 2 && !isTime)) {
-					// if range array has null limits, it should be auto
 					if (rangeIsArr && (rn[0] == null || rn[1] == null)) {
 						rn = {
 							min: rn[0] == null ? autoRangePart : {
@@ -3055,7 +2851,6 @@ function uPlot(opts, data, then) {
 
 					if (!rangeIsArr && isObj(rn)) {
 						let cfg = rn;
-						// this is similar to snapNumY
 						rn = (self, dataMin, dataMax) => dataMin == null ? nullNullTuple : rangeNum(dataMin, dataMax, cfg);
 					}
 				}
@@ -3069,7 +2864,6 @@ function uPlot(opts, data, then) {
 
 				sc.clamp = fnOrSelf(sc.clamp || clampScale);
 
-				// caches for expensive ops like asinh() & log()
 				sc._min = sc._max = null;
 
 				sc.valToPct = initValToPct(sc);
@@ -3080,7 +2874,6 @@ function uPlot(opts, data, then) {
 	initScale("x");
 	initScale("y");
 
-	// TODO: init scales from facets in mode: 2
 	if (mode == 1) {
 		series.forEach(s => {
 			initScale(s.scale);
@@ -3139,7 +2932,6 @@ function uPlot(opts, data, then) {
 
 	const pendScales = {};
 
-	// explicitly-set initial scales
 	for (let k in scales) {
 		let sc = scales[k];
 
@@ -3149,7 +2941,6 @@ function uPlot(opts, data, then) {
 		}
 	}
 
-//	self.tz = opts.tz || Intl.DateTimeFormat().resolvedOptions().timeZone;
 	const _tzDate  = (opts.tzDate || (ts => new Date(round(ts / ms))));
 	const _fmtDate = (opts.fmtDate || fmtDate);
 
@@ -3196,7 +2987,6 @@ function uPlot(opts, data, then) {
 		legendTable = placeTag("table", LEGEND, root);
 		legendBody = placeTag("tbody", null, legendTable);
 
-		// allows legend to be moved out of root
 		legend.mount(self, legendTable);
 
 		if (multiValLegend) {
@@ -3265,7 +3055,6 @@ function uPlot(opts, data, then) {
 				let seriesIdx = series.indexOf(s);
 
 				if ((e.ctrlKey || e.metaKey) != legend.isolate) {
-					// if any other series is shown, isolate this one. else show all
 					let isolate = series.some((s, i) => i > 0 && i != seriesIdx && s.show);
 
 					series.forEach((s, i) => {
@@ -3329,16 +3118,13 @@ function uPlot(opts, data, then) {
 	let plotWidCss = 0;
 	let plotHgtCss = 0;
 
-	// plot margins to account for axes
 	let plotLftCss = 0;
 	let plotTopCss = 0;
 
-	// previous values for diffing
 	let _plotLftCss = plotLftCss;
 	let _plotTopCss = plotTopCss;
 	let _plotWidCss = plotWidCss;
 	let _plotHgtCss = plotHgtCss;
-
 
 	let plotLft = 0;
 	let plotTop = 0;
@@ -3367,7 +3153,6 @@ function uPlot(opts, data, then) {
 	}
 
 	function calcSize(width, height) {
-	//	log("calcSize()", arguments);
 
 		self.width  = fullWidCss = plotWidCss = width;
 		self.height = fullHgtCss = plotHgtCss = height;
@@ -3383,10 +3168,8 @@ function uPlot(opts, data, then) {
 		plotWid = bb.width  = incrRound(plotWidCss * pxRatio, 0.5);
 		plotHgt = bb.height = incrRound(plotHgtCss * pxRatio, 0.5);
 
-	//	updOriDims();
 	}
 
-	// ensures size calc convergence
 	const CYCLE_LIMIT = 3;
 
 	function convergeSize() {
@@ -3415,9 +3198,7 @@ function uPlot(opts, data, then) {
 
 	self.setSize = setSize;
 
-	// accumulate axis offsets, reduce canvas width
 	function calcPlotRect() {
-		// easements for edge labels
 		let hasTopAxis = false;
 		let hasBtmAxis = false;
 		let hasRgtAxis = false;
@@ -3461,20 +3242,16 @@ function uPlot(opts, data, then) {
 		sidesWithAxes[2] = hasBtmAxis;
 		sidesWithAxes[3] = hasLftAxis;
 
-		// hz padding
 		plotWidCss -= _padding[1] + _padding[3];
 		plotLftCss += _padding[3];
 
-		// vt padding
 		plotHgtCss -= _padding[2] + _padding[0];
 		plotTopCss += _padding[0];
 	}
 
 	function calcAxesRects() {
-		// will accum +
 		let off1 = plotLftCss + plotWidCss;
 		let off2 = plotTopCss + plotHgtCss;
-		// will accum -
 		let off3 = plotLftCss;
 		let off0 = plotTopCss;
 
@@ -3507,7 +3284,6 @@ function uPlot(opts, data, then) {
 		let prox = hov.prox = fnOrSelf(hov.prox);
 		let bias = hov.bias ??= 0;
 
-		// TODO: only scan between in-view idxs (i0, i1)
 		cursor.dataIdx = (self, seriesIdx, cursorIdx, valAtPosX) => {
 			if (seriesIdx == 0)
 				return cursorIdx;
@@ -3599,9 +3375,7 @@ function uPlot(opts, data, then) {
 	const cursorFocus = focus.prox >= 0;
 	const cursorOnePt = cursorFocus && points.one;
 
-	// series-intersection markers
 	let cursorPts = [];
-	// position caches in CSS pixels
 	let cursorPtsLft = [];
 	let cursorPtsTop = [];
 
@@ -3713,8 +3487,6 @@ function uPlot(opts, data, then) {
 			cursorPtsTop.splice(i, 1);
 		}
 
-		// TODO: de-init no-longer-needed scales?
-
 		fire("delSeries", i);
 	}
 
@@ -3730,13 +3502,11 @@ function uPlot(opts, data, then) {
 
 			let sc = scales[axis.scale];
 
-			// this can occur if all series specify non-default scales
 			if (sc == null) {
 				axis.scale = isVt ? series[1].scale : xScaleKey;
 				sc = scales[axis.scale];
 			}
 
-			// also set defaults for incrs & values based on axis distr
 			let isTime = sc.time;
 
 			axis.size   = fnOrSelf(axis.size);
@@ -3760,14 +3530,10 @@ function uPlot(opts, data, then) {
 			let av = axis.values;
 
 			axis.values = (
-				// static array of tick values
 				isArr(av) && !isArr(av[0]) ? fnOrSelf(av) :
-				// temporal
 				isTime ? (
-					// config array of fmtDate string tpls
 					isArr(av) ?
 						timeAxisVals(_tzDate, timeAxisStamps(av, _fmtDate)) :
-					// fmtDate string tpl
 					isStr(av) ?
 						timeAxisVal(_tzDate, av) :
 					av || _timeAxisVals
@@ -3793,8 +3559,6 @@ function uPlot(opts, data, then) {
 				axis._el = placeDiv(AXIS, wrap);
 			}
 
-			// debug
-		//	axis._el.style.background = "#"  + Math.floor(Math.random()*16777215).toString(16) + '80';
 		}
 	}
 
@@ -3817,7 +3581,6 @@ function uPlot(opts, data, then) {
 
 	let dataLen;
 
-	// rendered data window
 	let i0 = null;
 	let i1 = null;
 	const idxs = mode == 1 ? series[0].idxs : null;
@@ -3860,8 +3623,6 @@ function uPlot(opts, data, then) {
 
 		fire("setData");
 
-		// forces x axis tick values to re-generate when neither x scale nor y scale changes
-		// in ordinal mode, scale range is by index, so will not change if new data has same length, but tick values are from data
 		if (xScaleDistr == 2) {
 			shouldConvergeSize = true;
 
@@ -3971,10 +3732,8 @@ function uPlot(opts, data, then) {
 			let _i0 = ifNull(i0, 0);
 			let _i1 = ifNull(i1, data.length - 1);
 
-			// only run getMinMax() for invalidated series data, else reuse
 			let minMax = facet.min == null ? getMinMax(data, _i0, _i1, sorted, wsc.distr == 3) : [facet.min, facet.max];
 
-			// initial min/max
 			wsc.min = min(wsc.min, facet.min = minMax[0]);
 			wsc.max = max(wsc.max, facet.max = minMax[1]);
 		}
@@ -3983,17 +3742,13 @@ function uPlot(opts, data, then) {
 	const AUTOSCALE = {min: null, max: null};
 
 	function setScales() {
-	//	log("setScales()", arguments);
 
-		// implicitly add auto scales, and unranged scales
 		for (let k in scales) {
 			let sc = scales[k];
 
 			if (pendScales[k] == null &&
 				(
-					// scales that have never been set (on init)
 					sc.min == null ||
-					// or auto scales when the x scale was explicitly set
 					pendScales[xScaleKey] != null && sc.auto(self, viaAutoScaleX)
 				)
 			) {
@@ -4001,7 +3756,6 @@ function uPlot(opts, data, then) {
 			}
 		}
 
-		// implicitly add dependent scales
 		for (let k in scales) {
 			let sc = scales[k];
 
@@ -4009,7 +3763,6 @@ function uPlot(opts, data, then) {
 				pendScales[k] = AUTOSCALE;
 		}
 
-		// explicitly setting the x-scale invalidates everything (acts as redraw)
 		if (pendScales[xScaleKey] != null)
 			resetYSeries(true); // TODO: only reset series on auto scales?
 
@@ -4038,7 +3791,6 @@ function uPlot(opts, data, then) {
 		}
 
 		if (dataLen > 0) {
-			// pre-range y-scales from y series' data values
 			series.forEach((s, i) => {
 				if (mode == 1) {
 					let k = s.scale;
@@ -4058,9 +3810,7 @@ function uPlot(opts, data, then) {
 						i0 = closestIdx(wsc.min, data[0]);
 						i1 = closestIdx(wsc.max, data[0]);
 
-						// don't try to contract same or adjacent idxs
 						if (i1 - i0 > 1) {
-							// closest indices can be outside of view
 							if (data[0][i0] < wsc.min)
 								i0++;
 							if (data[0][i1] > wsc.max)
@@ -4079,7 +3829,6 @@ function uPlot(opts, data, then) {
 				else {
 					if (i > 0) {
 						if (s.show && s.auto) {
-							// TODO: only handles, assumes and requires facets[0] / 'x' scale, and facets[1] / 'y' scale
 							let [ xFacet, yFacet ] = s.facets;
 							let xScaleKey = xFacet.scale;
 							let yScaleKey = yFacet.scale;
@@ -4088,11 +3837,9 @@ function uPlot(opts, data, then) {
 							let wscx = wipScales[xScaleKey];
 							let wscy = wipScales[yScaleKey];
 
-							// null can happen when only x is zoomed, but y has static range and doesnt get auto-added to pending
 							wscx != null && accScale(wscx, pendScales[xScaleKey], xFacet, xData, xFacet.sorted);
 							wscy != null && accScale(wscy, pendScales[yScaleKey], yFacet, yData, yFacet.sorted);
 
-							// temp
 							s.min = yFacet.min;
 							s.max = yFacet.max;
 						}
@@ -4100,7 +3847,6 @@ function uPlot(opts, data, then) {
 				}
 			});
 
-			// range independent scales
 			for (let k in wipScales) {
 				let wsc = wipScales[k];
 				let psc = pendScales[k];
@@ -4118,7 +3864,6 @@ function uPlot(opts, data, then) {
 			}
 		}
 
-		// range dependent scales
 		for (let k in wipScales) {
 			let wsc = wipScales[k];
 
@@ -4156,7 +3901,6 @@ function uPlot(opts, data, then) {
 		}
 
 		if (anyChanged) {
-			// invalidate paths of all series on changed scales
 			series.forEach((s, i) => {
 				if (mode == 2) {
 					if (i > 0 && changed.y)
@@ -4181,7 +3925,6 @@ function uPlot(opts, data, then) {
 			pendScales[k] = null;
 	}
 
-	// grabs the nearest indices with y data outside of x-scale limits
 	function getOuterIdxs(ydata) {
 		let _i0 = clamp(i0 - 1, 0, dataLen - 1);
 		let _i1 = clamp(i1 + 1, 0, dataLen - 1);
@@ -4298,7 +4041,6 @@ function uPlot(opts, data, then) {
 			boundsClip.rect(lft, top, wid, hgt);
 		}
 
-		// the points pathbuilder's gapsClip is its boundsClip, since points dont need gaps clipping, and bounds depend on point size
 		if (_points)
 			strokeFill(strokeStyle, width, s.dash, s.cap, fillStyle, stroke, fill, flags, gapsClip);
 		else
@@ -4310,10 +4052,7 @@ function uPlot(opts, data, then) {
 	function fillStroke(si, strokeStyle, lineWidth, lineDash, lineCap, fillStyle, strokePath, fillPath, flags, boundsClip, gapsClip) {
 		let didStrokeFill = false;
 
-		// for all bands where this series is the top edge, create upwards clips using the bottom edges
-		// and apply clips + fill with band fill or dfltFill
 		flags != 0 && bands.forEach((b, bi) => {
-			// isUpperEdge?
 			if (b.series[0] == si) {
 				let lowerEdge = series[b.series[1]];
 				let lowerData = data[b.series[1]];
@@ -4327,7 +4066,6 @@ function uPlot(opts, data, then) {
 
 				let _fillStyle = null;
 
-				// hasLowerEdge?
 				if (lowerEdge.show && bandClip && hasData(lowerData, i0, i1)) {
 					_fillStyle = b.fill(self, bi) || fillStyle;
 					gapsClip2 = lowerEdge._paths.clip;
@@ -4464,7 +4202,6 @@ function uPlot(opts, data, then) {
 	}
 
 	function axesCalc(cycleNum) {
-	//	log("axesCalc()", arguments);
 
 		let converged = true;
 
@@ -4500,19 +4237,15 @@ function uPlot(opts, data, then) {
 			if (_space == 0)
 				return;
 
-			// if we're using index positions, force first tick to match passed index
 			let forceMin = scale.distr == 2;
 
 			let _splits = axis._splits = axis.splits(self, i, min, max, _incr, _space, forceMin);
 
-			// tick labels
-			// BOO this assumes a specific data/series
 			let splits = scale.distr == 2 ? _splits.map(i => data0[i]) : _splits;
 			let incr   = scale.distr == 2 ? data0[_splits[1]] - data0[_splits[0]] : _incr;
 
 			let values = axis._values = axis.values(self, axis.filter(self, splits, i, _space, incr), i, _space, incr);
 
-			// rotating of labels only supported on bottom x axis
 			axis._rotate = side == 2 ? axis.rotate(self, values, i, _space) : 0;
 
 			let oldSize = axis._size;
@@ -4559,7 +4292,6 @@ function uPlot(opts, data, then) {
 
 			let [_incr, _space] = axis._found;
 
-			// axis label
 			if (axis.label != null) {
 				let shiftAmt = axis.labelGap * shiftDir;
 				let baseLpos = round((axis._lpos + shiftAmt) * pxRatio);
@@ -4600,8 +4332,6 @@ function uPlot(opts, data, then) {
 
 			let _splits = axis._splits;
 
-			// tick labels
-			// BOO this assumes a specific data/series
 			let splits = scale.distr == 2 ? _splits.map(i => data0[i]) : _splits;
 			let incr   = scale.distr == 2 ? data0[_splits[1]] - data0[_splits[0]] : _incr;
 
@@ -4611,7 +4341,6 @@ function uPlot(opts, data, then) {
 			let tickSize = round(_tickSize * pxRatio);
 			let axisGap = round((axis.alignTo == 2 ? axis._size - _tickSize - axis.gap : axis.gap) * pxRatio);
 
-			// rotating of labels only supported on bottom x axis
 			let angle = axis._rotate * -PI/180;
 
 			let basePos  = pxRound(axis._pos * pxRatio);
@@ -4666,7 +4395,6 @@ function uPlot(opts, data, then) {
 				}
 			}
 
-			// ticks
 			if (ticks.show) {
 				drawOrthoLines(
 					canOffs,
@@ -4682,7 +4410,6 @@ function uPlot(opts, data, then) {
 				);
 			}
 
-			// grid
 			let grid = axis.grid;
 
 			if (grid.show) {
@@ -4720,7 +4447,6 @@ function uPlot(opts, data, then) {
 	}
 
 	function resetYSeries(minMax) {
-	//	log("resetYSeries()", arguments);
 
 		series.forEach((s, i) => {
 			if (i > 0) {
@@ -4762,7 +4488,6 @@ function uPlot(opts, data, then) {
 		}
 	}
 
-	// manual batching (aka immediate mode), skips microtask queue
 	function batch(fn, _deferHooks = false) {
 		queuedCommit = true;
 		deferHooks = _deferHooks;
@@ -4777,7 +4502,6 @@ function uPlot(opts, data, then) {
 	self.batch = batch;
 
 	function _commit() {
-	//	log("_commit()", arguments);
 
 		if (shouldSetScales) {
 			setScales();
@@ -4803,8 +4527,6 @@ function uPlot(opts, data, then) {
 			setStylePx(wrap, WIDTH,   fullWidCss);
 			setStylePx(wrap, HEIGHT,  fullHgtCss);
 
-			// NOTE: mutating this during print preview in Chrome forces transparent
-			// canvas pixels to white, even when followed up with clearRect() below
 			can.width  = round(fullWidCss * pxRatio);
 			can.height = round(fullHgtCss * pxRatio);
 
@@ -4826,7 +4548,6 @@ function uPlot(opts, data, then) {
 				}
 			});
 
-			// invalidate ctx style cache
 			ctxStroke = ctxFill = ctxWidth = ctxJoin = ctxCap = ctxFont = ctxAlign = ctxBaseline = ctxDash = null;
 			ctxAlpha = 1;
 
@@ -4925,9 +4646,6 @@ function uPlot(opts, data, then) {
 			commit();
 	};
 
-	// redraw() => setScale('x', scales.x.min, scales.x.max);
-
-	// explicit, never re-ranged (is this actually true? for x and y)
 	function setScale(key, opts) {
 		let sc = scales[key];
 
@@ -4957,8 +4675,6 @@ function uPlot(opts, data, then) {
 				}
 			}
 
-		//	log("setScale()", arguments);
-
 			pendScales[key] = opts;
 
 			shouldSetScales = true;
@@ -4968,26 +4684,20 @@ function uPlot(opts, data, then) {
 
 	self.setScale = setScale;
 
-//	INTERACTION
-
 	let xCursor;
 	let yCursor;
 	let vCursor;
 	let hCursor;
 
-	// starting position before cursor.move
 	let rawMouseLeft0;
 	let rawMouseTop0;
 
-	// starting position
 	let mouseLeft0;
 	let mouseTop0;
 
-	// current position before cursor.move
 	let rawMouseLeft1;
 	let rawMouseTop1;
 
-	// current position
 	let mouseLeft1;
 	let mouseTop1;
 
@@ -5063,7 +4773,6 @@ function uPlot(opts, data, then) {
 	}
 
 	function setSeries(i, opts, _fire, _pub) {
-	//	log("setSeries()", arguments);
 
 		if (opts.focus != null)
 			setFocus(i);
@@ -5125,7 +4834,6 @@ function uPlot(opts, data, then) {
 			legendRows[i].style.opacity = value;
 	}
 
-	// y-distance
 	let closestDist;
 	let closestSeries;
 	let focusedSeries;
@@ -5133,7 +4841,6 @@ function uPlot(opts, data, then) {
 
 	function setFocus(i) {
 		if (i != focusedSeries) {
-		//	log("setFocus()", arguments);
 
 			let allFocused = i == null;
 
@@ -5219,7 +4926,6 @@ function uPlot(opts, data, then) {
 	self.setCursor = (opts, _fire, _pub) => {
 		mouseLeft1 = opts.left;
 		mouseTop1 = opts.top;
-	//	assign(cursor, opts);
 		updateCursor(null, _fire, _pub);
 	};
 
@@ -5297,7 +5003,6 @@ function uPlot(opts, data, then) {
 	}
 
 	function updateCursor(src, _fire, _pub) {
-	//	ts == null && log("updateCursor()", arguments);
 
 		rawMouseLeft1 = mouseLeft1;
 		rawMouseTop1 = mouseTop1;
@@ -5314,18 +5019,14 @@ function uPlot(opts, data, then) {
 
 		let idx;
 
-		// when zooming to an x scale range between datapoints the binary search
-		// for nearest min/max indices results in this condition. cheap hack :D
 		let noDataInRange = i0 > i1; // works for mode 1 only
 
 		closestDist = inf;
 		closestSeries = null;
 
-		// TODO: extract
 		let xDim = scaleX.ori == 0 ? plotWidCss : plotHgtCss;
 		let yDim = scaleX.ori == 1 ? plotWidCss : plotHgtCss;
 
-		// if cursor hidden, hide points & clear legend vals
 		if (mouseLeft1 < 0 || dataLen == 0 || noDataInRange) {
 			idx = cursor.idx = null;
 
@@ -5343,7 +5044,6 @@ function uPlot(opts, data, then) {
 			}
 		}
 		else {
-		//	let pctY = 1 - (y / rect.height);
 
 			let mouseXPos, valAtPosX, xPos;
 
@@ -5354,7 +5054,6 @@ function uPlot(opts, data, then) {
 				xPos = valToPosX(data[0][idx], scaleX, xDim, 0);
 			}
 
-			// closest pt values
 			let _ptLft = -10;
 			let _ptTop = -10;
 			let _ptWid = 0;
@@ -5379,7 +5078,6 @@ function uPlot(opts, data, then) {
 				if (i > 0 && s.show) {
 					let xPos2 = idx2 == null ? -10 : idx2 == idx ? xPos : valToPosX(mode == 1 ? data[0][idx2] : data[i][0][idx2], scaleX, xDim, 0);
 
-					// this doesnt really work for state timeline, heatmap, status history (where the value maps to color, not y coords)
 					let yPos = yVal2 == null ? -10 : valToPosY(yVal2, mode == 1 ? scales[s.scale] : scales[s.facets[1].scale], yDim, 0);
 
 					if (cursorFocus && yVal2 != null) {
@@ -5395,8 +5093,6 @@ function uPlot(opts, data, then) {
 								let seriesYValSign = yVal2     >= 0 ? 1 : -1;
 								let mouseYValSign  = mouseYVal >= 0 ? 1 : -1;
 
-								// with a focus bias, we will never cross zero when prox testing
-								// it's either closest towards zero, or closest away from zero
 								if (mouseYValSign == seriesYValSign && (
 									mouseYValSign == 1 ?
 										(bias == 1 ? yVal2 >= mouseYVal : yVal2 <= mouseYVal) :  // >= 0
@@ -5476,10 +5172,7 @@ function uPlot(opts, data, then) {
 				}
 			}
 
-			// if only using single hover point (at cursorPts[0])
-			// we have trigger styling at last visible series (once closestSeries is settled)
 			if (cursorOnePt) {
-				// some of this logic is similar to series focus below, since it matches the behavior by design
 
 				let p = focus.prox;
 
@@ -5500,14 +5193,12 @@ function uPlot(opts, data, then) {
 			}
 		}
 
-		// nit: cursor.drag.setSelect is assumed always true
 		if (select.show && dragging) {
 			if (src != null) {
 				let [xKey, yKey] = syncOpts.scales;
 				let [matchXKeys, matchYKeys] = syncOpts.match;
 				let [xKeySrc, yKeySrc] = src.cursor.sync.scales;
 
-				// match the dragX/dragY implicitness/explicitness of src
 				let sdrag = src.cursor.drag;
 				dragX = sdrag._x;
 				dragY = sdrag._y;
@@ -5582,12 +5273,10 @@ function uPlot(opts, data, then) {
 				let uni = drag.uni;
 
 				if (uni != null) {
-					// only calc drag status if they pass the dist thresh
 					if (dragX && dragY) {
 						dragX = rawDX >= uni;
 						dragY = rawDY >= uni;
 
-						// force unidirectionality when both are under uni limit
 						if (!dragX && !dragY) {
 							if (rawDY > rawDX)
 								dragY = true;
@@ -5597,7 +5286,6 @@ function uPlot(opts, data, then) {
 					}
 				}
 				else if (drag.x && drag.y && (dragX || dragY))
-					// if omni with no uni then both dragX / dragY should be true if either is true
 					dragX = dragY = true;
 
 				let p0, p1;
@@ -5634,7 +5322,6 @@ function uPlot(opts, data, then) {
 						setSelX(0, xDim);
 				}
 
-				// the drag didn't pass the dist requirement
 				if (!dragX && !dragY) {
 					setSelX(0, 0);
 					setSelY(0, 0);
@@ -5706,11 +5393,6 @@ function uPlot(opts, data, then) {
 		if (cursor._lock)
 			return;
 
-		// Chrome on Windows has a bug which triggers a stray mousemove event after an initial mousedown event
-		// when clicking into a plot as part of re-focusing the browser window.
-		// we gotta ignore it to avoid triggering a phantom drag / setSelect
-		// However, on touch-only devices Chrome-based browsers trigger a 0-distance mousemove before mousedown
-		// so we don't ignore it when mousedown has set the dragging flag
 		if (dragging && e != null && e.movementX == 0 && e.movementY == 0)
 			return;
 
@@ -5826,7 +5508,6 @@ function uPlot(opts, data, then) {
 		downSelectWidth  = width;
 		downSelectHeight = height;
 
-	//	hideSelect();
 	}
 
 	function mouseUp(e, src, _l, _t, _w, _h, _i) {
@@ -5847,10 +5528,6 @@ function uPlot(opts, data, then) {
 		hasSelect && chgSelect && setSelect(select);
 
 		if (drag.setScale && hasSelect && chgSelect) {
-		//	if (syncKey != null) {
-		//		dragX = drag.x;
-		//		dragY = drag.y;
-		//	}
 
 			let xOff = left,
 				xDim = width,
@@ -5906,7 +5583,6 @@ function uPlot(opts, data, then) {
 		let _dragging = dragging;
 
 		if (dragging) {
-			// handle case when mousemove aren't fired all the way to edges by browser
 			let snapH = true;
 			let snapV = true;
 			let snapProx = 10;
@@ -5923,7 +5599,6 @@ function uPlot(opts, data, then) {
 			}
 
 			if (dragH && dragV) {
-				// maybe omni corner snap
 				snapH = mouseLeft1 <= snapProx || mouseLeft1 >= plotWidCss - snapProx;
 				snapV = mouseTop1  <= snapProx || mouseTop1  >= plotHgtCss - snapProx;
 			}
@@ -5944,7 +5619,6 @@ function uPlot(opts, data, then) {
 
 		activeIdxs.fill(null);
 
-		// passing a non-null timestamp to force sync/mousemove event
 		updateCursor(null, true, true);
 
 		if (_dragging)
@@ -5972,7 +5646,6 @@ function uPlot(opts, data, then) {
 
 	on(dppxchange, win, syncPxRatio);
 
-	// internal pub/sub
 	const events = {};
 
 	events.mousedown = mouseDown;
@@ -6001,7 +5674,6 @@ function uPlot(opts, data, then) {
 		self.syncRect = syncRect;
 	}
 
-	// external on/off
 	const hooks = self.hooks = opts.hooks || {};
 
 	function fire(evName, a1, a2) {

@@ -96,6 +96,7 @@ export default {
   "Width of the paint": "Breite der Linien",
   "Lowest thing under the roof": "Niedrigstes unter dem Dach",
   "not measured": "nicht gemessen",
+  "Schedules may start drones without a person": "Zeitpläne dürfen Drohnen ohne einen Menschen starten",
   "Arm only while an interlock says the aisles are closed": "Nur scharf stellen, solange eine Verriegelung die Gänge geschlossen meldet",
   "Letters": "Buchstaben",
   "First node, x": "Erster Knoten, x",

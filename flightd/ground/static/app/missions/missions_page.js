@@ -8,6 +8,8 @@ import { FlyCard } from "./fly_card.js";
 import { KeptCard } from "./kept_card.js";
 import { keyOf, loadEstimate, loadMissions } from "./missions_source.js";
 import { enter, missions } from "./missions_state.js";
+import { SchedulesCard } from "./schedules_card.js";
+import { loadSchedules } from "./schedules_source.js";
 
 const LIST_MS = 3000;
 const CHOOSING_MS = 200;
@@ -22,8 +24,12 @@ export default function MissionsPage() {
   useEffect(() => {
     if (site && missions().site !== site) enter(site);
     if (!site) return undefined;
-    loadMissions();
-    const again = setInterval(() => document.hidden || loadMissions(), LIST_MS);
+    const load = () => {
+      loadMissions();
+      loadSchedules();
+    };
+    load();
+    const again = setInterval(() => document.hidden || load(), LIST_MS);
     return () => clearInterval(again);
   }, [site]);
   useEffect(() => {
@@ -51,6 +57,7 @@ export default function MissionsPage() {
       <div class="missions-side">
         <${FlyCard} key=${state.selected} estimate=${estimate} waits=${waits} />
         <${KeptCard} />
+        <${SchedulesCard} floor=${welcome.floor} />
       </div>
     </div>
   `;

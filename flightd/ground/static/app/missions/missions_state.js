@@ -15,6 +15,8 @@ const EMPTY = {
   estimate: null, // {key, planned} or {key, trouble}
   list: null, // missions that are kept; null: not known yet
   kept: true, // this station has a folder to keep them in
+  schedules: null, // {kept, list}: the site's schedules, and whether any are kept here; null: not known yet
+  scheduleTrouble: "", // what the last act on a schedule came to
   trouble: "", // what the last act on a kept mission came to
   refused: false, // `flying` is why it was not
   flying: "", // what became of handing the mission over; empty: nothing is under way

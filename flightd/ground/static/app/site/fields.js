@@ -23,6 +23,7 @@ export const FIELDS = {
     number("line_width_m", english("Width of the paint"), M, "0.075"),
     number("ceiling_m", english("Lowest thing under the roof"), M, english("not measured")),
     check("interlock", english("Arm only while an interlock says the aisles are closed"), false),
+    check("unattended_start", english("Schedules may start drones without a person"), false),
   ],
   aisle: [
     text("id", english("Letters")),

@@ -1,0 +1,326 @@
+"""Starts what is due: each run once, and only where nobody and nothing speaks against it.
+
+A run stands in the book before anything is ordered.  Its plan and its start have ids of their own, so that a
+station that died in between sends the same orders again, which the drone does once; where the drone's flightd
+was started anew meanwhile nobody knows what it did, and nothing is sent again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+import uuid
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import Final, Protocol
+
+from flightd.adapters.ground_link.messages.answers import Accepted, Planned, Welcome
+from flightd.adapters.ground_link.messages.published import StatusReport
+from flightd.core.errors import FlightdError, InputError, RunError
+from flightd.core.types import CommandKind, Phase
+from flightd.fleet.schedule.due import LOOK_BACK, decide
+from flightd.fleet.schedule.rule import MOST_WINDOW, Occurrence
+from flightd.ground.access.roles import Identity, Role
+from flightd.ground.bounded import Threads
+from flightd.ground.ground_store.store import GroundStore
+from flightd.ground.manager_routes import Managers
+from flightd.ground.messages import Act
+from flightd.ground.missions.mission_book import MissionBook
+from flightd.ground.schedules.kept import CountMission, Schedule
+from flightd.ground.schedules.schedule_book import MOST_RUNS, ORDERED, Run, RunState, ScheduleBook
+from flightd.ground.schedules.start_rules import PLAN, Cause, Objection, is_flying_plan, objection
+from flightd.ground.schedules.work import Work, work_of
+
+_LOG = logging.getLogger(__name__)
+_AT_ONCE, _MOST_WAITING = 1, 8
+_MOST_WORDS = 300
+_GIVEN_UP_S: Final = 3600.0
+"""So long after the end of its time a run that was ordered waits for the drone to be heard."""
+_QUIET: Final = Objection(Cause.QUIET, "these are quiet hours")
+_OFF: Final = Objection(Cause.OFF, "the station was off, or its clock jumped")
+
+
+@dataclass(frozen=True, slots=True)
+class StationClock:
+    """The time of day, UTC; how often the schedules are looked at; and after how long a drone that refused a
+    run is asked again."""
+
+    utc_ns: Callable[[], int] = time.time_ns
+    step_s: float = 2.0
+    rest_s: float = 30.0
+
+
+THIS_MACHINE: Final = StationClock()
+
+
+class ScheduledDrone(Protocol):
+    """What `DroneLink` is to a schedule."""
+
+    name: str
+    attends_run: bool
+    by_person_at_s: float
+
+    @property
+    def welcome(self) -> Welcome | None: ...
+
+    @property
+    def heard(self) -> StatusReport | None: ...
+
+    async def act(self, act: Act, *, by_person: bool = True) -> Accepted: ...
+
+    async def plan_flight(
+        self,
+        nodes: Sequence[str],
+        levels: Sequence[int],
+        order_id: str = "",
+        *,
+        best_order: bool = False,
+        dry: bool = False,
+        session: str = "",
+        seen_ns: int = 0,
+        by_person: bool = True,
+    ) -> Planned: ...
+
+
+class Audit(Protocol):
+    """Where it is written down what a schedule did."""
+
+    def write_down(self, who: Identity | None, address: str, act: str, target: str, **outcome: str) -> None:
+        """A line of it."""
+        ...
+
+
+class NightShift:
+    """`run` looks at the schedules of the `book` until cancelled; what a run counts is in the `missions`, in
+    the `store` and on the drone's floor."""
+
+    def __init__(
+        self,
+        book: ScheduleBook,
+        missions: MissionBook,
+        store: GroundStore | None,
+        drones: Mapping[str, ScheduledDrone],
+        audit: Audit,
+        managers: Managers | None = None,
+        clock: StationClock = THIS_MACHINE,
+    ) -> None:
+        self._book = book
+        self._missions = missions
+        self._store = store
+        self._drones = drones
+        self._audit = audit
+        self._managers = managers
+        self._clock = clock
+        self._threads = Threads(_AT_ONCE, _MOST_WAITING, "the schedules are being looked at already")
+        self._trouble: dict[str, str] = {}
+        self._rests: dict[str, float] = {}
+        """Until when nothing is ordered for a schedule, by the loop's clock: its drone has just refused."""
+
+    async def run(self) -> None:
+        """Look, and look again."""
+        while True:
+            try:
+                await self.step()
+                self._note("step", "")
+            except Exception as err:  # noqa: BLE001 - its end would be the station's
+                self._note("step", f"the schedules failed: {err!r}")
+            await asyncio.sleep(self._clock.step_s)
+
+    async def step(self) -> None:
+        """Start what is due, and write down what was missed."""
+        wanted: set[str] = set()
+        try:
+            schedules = await self._threads.run(self._book.schedules)
+            self._note("", "")
+        except FlightdError as err:
+            schedules = []
+            self._note("", str(err))
+        for schedule in schedules:
+            try:
+                if await self._look(schedule):
+                    wanted.add(schedule.kept.drone)
+                self._note(schedule.id, "")
+            except FlightdError as err:  # nothing is started that is not written down
+                self._note(schedule.id, f"schedule {schedule.kept.name}: {err}")
+        self._trouble = {of: text for of, text in self._trouble.items() if text}
+        for name, drone in self._drones.items():
+            drone.attends_run = name in wanted or is_flying_plan(drone.heard)
+
+    def _note(self, of: str, trouble: str) -> None:
+        if trouble and self._trouble.get(of) != trouble:
+            _LOG.warning("%s", trouble)
+        self._trouble[of] = trouble
+
+    async def _look(self, schedule: Schedule) -> bool:
+        """Whether a run is due, or ordered and unanswered, so that the station attends."""
+        now = datetime.fromtimestamp(self._clock.utc_ns() / 1e9, UTC)
+        oldest = (now - LOOK_BACK - 2 * MOST_WINDOW).date()
+        runs = {
+            run.day: run for run in await self._threads.run(self._book.runs, schedule.id, MOST_RUNS, oldest)
+        }
+        unanswered = [run for run in runs.values() if run.state is RunState.ORDERED]
+        for run in unanswered:
+            await self._resume(schedule, run, now)
+        if not schedule.kept.enabled:
+            return bool(unanswered)
+        since = datetime.fromtimestamp(schedule.since_ns / 1e9, UTC)
+        ordered = [day for day, run in runs.items() if run.state in ORDERED]
+        told = [day for day, run in runs.items() if run.state is RunState.MISSED]
+        decision = decide(schedule.rule, since, ordered, told, now)
+        for missed in decision.missed:
+            await self._miss(schedule, missed, runs.get(missed.day))
+        if decision.due is None:
+            return bool(unanswered)
+        known = runs.get(decision.due.day)
+        if decision.is_quiet:
+            await self._wait(schedule, decision.due, known, _QUIET)
+            return bool(unanswered)
+        await self._begin(schedule, decision.due, known, now)
+        return True
+
+    async def _begin(self, schedule: Schedule, due: Occurrence, known: Run | None, now: datetime) -> None:
+        """Start a run, or write down what speaks against it."""
+        if asyncio.get_running_loop().time() < self._rests.get(schedule.id, 0.0):
+            return
+        drone = self._drones.get(schedule.kept.drone)
+        if drone is None:
+            none = Objection(Cause.UNREACHABLE, f"there is no drone {schedule.kept.drone!r}")
+            await self._wait(schedule, due, known, none)
+            return
+        drone.attends_run = True
+        against = self._objection(schedule, drone)
+        status, welcome = drone.heard, drone.welcome
+        if against is not None or status is None or welcome is None:
+            await self._wait(schedule, due, known, against or _OFF)
+            return
+        try:
+            work: Work = await self._threads.run(
+                work_of, schedule, welcome.floor, self._missions, self._store, now
+            )
+        except FlightdError as err:
+            await self._wait(schedule, due, known, Objection(Cause.WORK, str(err)))
+            return
+        run = Run(
+            schedule=schedule.id,
+            day=due.day,
+            state=RunState.ORDERED,
+            due_ns=_ns(due.at),
+            changed_ns=self._clock.utc_ns(),
+            drone=drone.name,
+            plan=f"{PLAN}{uuid.uuid4().hex}",
+            session=welcome.session,
+            nodes=work.nodes,
+            levels=work.levels,
+        )
+        await self._threads.run(self._book.write, run)
+        await self._order(schedule, run, drone, may_be_started=False)
+
+    async def _resume(self, schedule: Schedule, run: Run, now: datetime) -> None:
+        """Go on with a run that was ordered and not answered: the link was lost, or the station ended."""
+        drone = self._drones.get(run.drone)
+        status = None if drone is None else drone.heard
+        over_s = (self._clock.utc_ns() - run.due_ns) / 1e9 - schedule.kept.late_minutes * 60
+        if drone is None or status is None:
+            if over_s > _GIVEN_UP_S:
+                await self._write(replace(run, state=RunState.UNKNOWN, why="the drone was not heard again"))
+        elif status.session != run.session:
+            why = "its flightd was started anew before it answered"
+            await self._write(replace(run, state=RunState.UNKNOWN, why=why))
+        elif status.plan == run.plan and status.phase is not Phase.PREFLIGHT:
+            await self._write(replace(run, state=RunState.STARTED))
+        elif over_s >= 0:
+            await self._write(replace(run, state=RunState.UNKNOWN, why="the drone did not answer in time"))
+        elif not schedule.rule.is_quiet(now) and self._objection(schedule, drone) is None:
+            await self._order(schedule, run, drone, may_be_started=True)
+
+    async def _order(
+        self, schedule: Schedule, run: Run, drone: ScheduledDrone, *, may_be_started: bool
+    ) -> None:
+        """Hand the run's plan to the drone and start it; no answer leaves it as it is.  `may_be_started`: a
+        start was sent before, to which nobody answered."""
+        status = drone.heard
+        seen_ns = 0 if status is None else status.stamp_ns
+        try:
+            planned = await drone.plan_flight(
+                run.nodes, run.levels, run.plan, session=run.session, seen_ns=seen_ns, by_person=False
+            )
+            start = Act(f"{run.plan}-go", CommandKind.START, "", run.plan, run.session, seen_ns)
+            may_be_started = True
+            await drone.act(start, by_person=False)
+        except (RunError, InputError) as err:
+            is_same = drone.welcome is not None and drone.welcome.session == run.session
+            state = RunState.WAITING if is_same or not may_be_started else RunState.UNKNOWN
+            await self._refused(schedule, run, state, str(err).removeprefix("refused: "))
+            return
+        except FlightdError as err:
+            _LOG.warning("schedule %s: %s does not answer: %s", schedule.kept.name, drone.name, err)
+            return
+        await self._write(replace(run, state=RunState.STARTED, nodes=planned.nodes, cause="", why=""))
+        self._write_down(schedule, run, "accepted", f"{run.day}: {', '.join(planned.nodes)}")
+        count = schedule.kept.count
+        if isinstance(count, CountMission):
+            flown = (count.mission, run.plan, planned.nodes, self._clock.utc_ns())
+            await self._threads.run(self._missions.handed_over, *flown)
+
+    async def _refused(self, schedule: Schedule, run: Run, state: RunState, why: str) -> None:
+        """The drone does not take it: that may change, unless another flightd answered than may have started
+        it."""
+        now_s = asyncio.get_running_loop().time()
+        self._rests = {of: until_s for of, until_s in self._rests.items() if until_s > now_s}
+        self._rests[schedule.id] = now_s + self._clock.rest_s
+        await self._write(replace(run, state=state, cause=Cause.REFUSED.value, why=why))
+        self._write_down(schedule, run, "refused", why)
+
+    async def _wait(self, schedule: Schedule, due: Occurrence, known: Run | None, why: Objection) -> None:
+        if known is not None and (known.state, known.cause, known.why) == (
+            RunState.WAITING,
+            why.cause,
+            why.why,
+        ):
+            return
+        await self._write(_not_ordered(schedule, due, RunState.WAITING, why))
+
+    async def _miss(self, schedule: Schedule, missed: Occurrence, known: Run | None) -> None:
+        """Tell once that a run's time is over, with what kept it."""
+        kept = known is not None and known.state is RunState.WAITING
+        why = Objection(Cause(known.cause), known.why) if known is not None and kept else _OFF
+        run = _not_ordered(schedule, missed, RunState.MISSED, why)
+        await self._write(run)
+        self._write_down(schedule, run, "missed", f"{run.day}: {why.why}")
+
+    def _objection(self, schedule: Schedule, drone: ScheduledDrone) -> Objection | None:
+        return objection(
+            schedule.kept.site,
+            drone.welcome,
+            drone.heard,
+            by_manager=self._managers is not None and self._managers.flies(drone.name),
+            since_person_s=asyncio.get_running_loop().time() - drone.by_person_at_s,
+        )
+
+    async def _write(self, run: Run) -> None:
+        await self._threads.run(self._book.write, replace(run, changed_ns=self._clock.utc_ns()))
+
+    def _write_down(self, schedule: Schedule, run: Run, outcome: str, text: str) -> None:
+        who = Identity(f"schedule {schedule.kept.name}", Role.OPERATOR, "schedule")
+        self._audit.write_down(
+            who, "", "start", schedule.kept.drone, outcome=outcome, text=text[:_MOST_WORDS], id=run.plan
+        )
+
+
+def _not_ordered(schedule: Schedule, due: Occurrence, state: RunState, why: Objection) -> Run:
+    return Run(
+        schedule=schedule.id,
+        day=due.day,
+        state=state,
+        due_ns=_ns(due.at),
+        changed_ns=0,
+        drone=schedule.kept.drone,
+        cause=why.cause.value,
+        why=why.why,
+    )
+
+
+def _ns(at: datetime) -> int:
+    return round(at.timestamp()) * 1_000_000_000

@@ -1,0 +1,98 @@
+"""Which nodes a run counts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from flightd.adapters.ground_link.messages.floor import FloorNode, FloorStatus
+from flightd.core.errors import InputError
+from flightd.core.inventory import LocationState
+from flightd.core.planned_flight import MOST_NODES
+from flightd.fleet.schedule.rolling import NodeCount, run_nodes
+from flightd.ground.ground_store.pages import MOST_ROWS
+from flightd.ground.ground_store.store import GroundStore
+from flightd.ground.missions.mission_book import MissionBook
+from flightd.ground.schedules.kept import CountAisles, CountMission, Schedule
+
+_MOST_RUNS = 400
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """Nodes in the order in which they are flown, and shelf levels (none: all); `mission` is the id of the
+    kept mission that they are of, or empty."""
+
+    nodes: tuple[str, ...]
+    levels: tuple[int, ...] = ()
+    mission: str = ""
+
+
+def work_of(
+    schedule: Schedule, floor: FloorStatus, missions: MissionBook, store: GroundStore | None, now: datetime
+) -> Work:
+    """What a run of the schedule counts now; reads files.  InputError where that is nothing, or cannot be
+    known."""
+    count = schedule.kept.count
+    if isinstance(count, CountMission):
+        mission = missions.mission(count.mission)
+        if mission.site != schedule.kept.site:
+            raise InputError(f"the mission is one of site {mission.site}")
+        return Work(mission.nodes, mission.levels, mission.id)
+    if isinstance(count, CountAisles):
+        return Work(_aisle_nodes(floor, count.aisles), count.levels)
+    if store is None:
+        raise InputError(
+            "all of a site is counted by the ground store, and there is none", remedy="give --store FILE"
+        )
+    following = [one.at for one in schedule.rule.next_occurrences(now, _MOST_RUNS)]
+    known = _counts(floor, list(_stock(store, schedule.kept.site)))
+    nodes = run_nodes(known, now, timedelta(days=count.within_days), following)
+    return Work(nodes[:MOST_NODES])
+
+
+def _aisle_nodes(floor: FloorStatus, aisles: Sequence[str]) -> tuple[str, ...]:
+    found: list[str] = []
+    for aisle in dict.fromkeys(aisles):
+        nodes = [node.id for node in _shelved(floor) if node.aisle == aisle]
+        if not nodes:
+            raise InputError(f"aisle {aisle} has no node at which something is counted")
+        found += nodes
+    return tuple(found)
+
+
+def _shelved(floor: FloorStatus) -> Sequence[FloorNode]:
+    """The nodes that face a place; all, where the site knows no places."""
+    return [node for node in floor.nodes if node.levels] or floor.nodes
+
+
+def _stock(store: GroundStore, site: str) -> Iterator[dict[str, Any]]:
+    """Every place of the site; none where the store does not know it yet."""
+    if site not in {one["site"] for one in store.sites()}:
+        return
+    after = ""
+    while rows := store.stock(site, after):
+        yield from rows
+        if len(rows) < MOST_ROWS:
+            return
+        after = rows[-1]["location"]
+
+
+def _counts(floor: FloorStatus, stock: Sequence[dict[str, Any]]) -> list[NodeCount]:
+    """The nodes to be counted, aisle by aisle as on the floor, with the worst that is known of each."""
+    oldest: dict[str, datetime | None] = {}
+    exceptions = set()
+    for place in stock:
+        node, state = place["node"], LocationState(place["state"])
+        if state in {LocationState.UNREADABLE, LocationState.OCCLUDED}:
+            exceptions.add(node)
+        ns = place["utc_ns"]
+        never = ns is None or state is LocationState.NOT_VISITED
+        at = None if never else datetime.fromtimestamp(ns / 1e9, UTC)
+        before = oldest.get(node, at)
+        oldest[node] = None if at is None or before is None else min(at, before)
+    return [
+        NodeCount(node.id, node.id in exceptions, oldest.get(node.id)) for node in floor.nodes if node.levels
+    ]
