@@ -40,7 +40,7 @@ _IN_AIR = (
     CommandKind.STOP,
 )
 _COUNTS_S = 6.0
-_LASTS_S = {Phase.TAKE_OFF: 3.0, Phase.HOVER: 1.0, Phase.LAND: 3.0}
+_LASTS_S = {Phase.TAKE_OFF: 3.0, Phase.HOVER: 1.0, Phase.LAND: 3.0, Phase.RECOVER: 3.0}
 
 
 def hall(drone: str, name: str = "hall") -> Site:
@@ -65,7 +65,7 @@ class PaperDrone:
         self.site = site
         self._tell = tell
         self.on_person: Callable[[], None] = lambda: None
-        self.heard = True
+        self.heard = self.sees = True
         self.counts = self.never_starts = False
         self.plan = ""
         self._nodes: tuple[str, ...] = ()
@@ -78,15 +78,29 @@ class PaperDrone:
         self.way: list[str] = []
         self.begin_anew()
 
-    def begin_anew(self) -> None:
-        """Its daemon begins anew, on the pad."""
+    def begin_anew(self, *, on_pad: bool = True) -> None:
+        """Its daemon begins anew, believing to be on its pad."""
         self._session += 1
         self.phase, self.way, self.paused, self.left_s = Phase.PREFLIGHT, [], False, 900.0
+        self.ends_as = Phase.DONE
         self._timer_s = 0.0
-        at = self.site.nodes[self.site.home.node]
-        self.truth.x_m, self.truth.y_m, self.truth.z_m = at.x_m, at.y_m, 0.0
+        self._begins_in_air = self.truth.z_m > 0.0 and not on_pad
+        if self._begins_in_air:
+            self.phase = Phase.RECOVER
+        if on_pad:
+            self.truth.x_m, self.truth.y_m = self._pad
+            self.truth.z_m = 0.0
         welcome = {"session": f"{self.name} {self._session}", "floor": floor_status(self.site)}
         self._tell(self.name, "welcome", {**welcome, "role": "operator"})
+
+    @property
+    def _pad(self) -> tuple[float, float]:
+        at = self.site.nodes[self.site.home.node]
+        return at.x_m, at.y_m
+
+    def come_down(self) -> None:
+        """Its own rules land it where it is."""
+        self.phase, self._timer_s, self.way, self.ends_as = Phase.LAND, 0.0, [], Phase.ABORTED
 
     # as DroneLink
 
@@ -115,7 +129,7 @@ class PaperDrone:
                 self.plan, self.paused = "", False  # nobody sends it anywhere any more
                 self.way = [here, *self._home_from(here)]
             case CommandKind.LAND | CommandKind.STOP:
-                self.phase, self._timer_s, self.way = Phase.LAND, 0.0, []
+                self.come_down()
         return Accepted(version=1, request=act.id)
 
     async def plan_flight(
@@ -172,7 +186,9 @@ class PaperDrone:
                 self._begin(Phase.FOLLOW)
             case Phase.LAND:
                 self.truth.z_m = 0.0
-                self._begin(Phase.DONE)
+                self._begin(self.ends_as)
+            case Phase.RECOVER:
+                self.come_down()
             case _:
                 pass
 
@@ -212,8 +228,9 @@ class PaperDrone:
     @property
     def status(self) -> StatusReport:
         """What it tells now."""
-        at = Position(self.truth.x_m, self.truth.y_m, 0.0, 0.0, 1.0, 0.02, 0.02)
         armed = self.flies
+        x_m, y_m = self._pad if self._begins_in_air else (self.truth.x_m, self.truth.y_m)
+        at = Position(x_m, y_m, 0.0, 0.0, 1.0, 0.02, 0.02) if armed and self.sees else None
         landed = "in_air" if armed else "on_ground"
         vehicle = VehicleReport("GUIDED", armed, True, landed, 0.0, 0.0, 0.9, 12.0, 0.0, 0.0, "")
         return StatusReport(

@@ -117,11 +117,12 @@ class Dispatcher:
             self._shut.pop(node, None)
         self.queue.retry(nodes)
 
-    def withdraw(self, drone: str, place: int, air: Collection[int], now_ms: int) -> None:
-        """A drone is flown by somebody else, near `place` and anywhere in `air`: what it had to count is
-        given to others, who fly round it (`TrafficControl.roam`).  Again whenever its air has changed."""
+    def withdraw(self, drone: str, place: int, air: Collection[int], doubt_m: float, now_ms: int) -> None:
+        """A drone is flown by somebody else, near `place` and anywhere in `air`, or so far beside:
+        what it had to count is given to others, who fly round it (`TrafficControl.roam`).  Again whenever its
+        air has changed."""
         before = self._near(drone)
-        self._held |= set(self.control.roam(drone, place, air, now_ms))
+        self._held |= set(self.control.roam(drone, place, air, doubt_m, now_ms))
         self._held.discard(drone)
         self._avoided.discard(drone)
         self._waits_since_ms.pop(drone, None)

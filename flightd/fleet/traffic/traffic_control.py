@@ -62,16 +62,30 @@ class TrafficControl:
                 return False
         return True
 
-    def roam(self, drone: str, place: int, air: Collection[int], now_ms: int) -> tuple[str, ...]:
-        """A drone flies by somebody else's will, is near `place` and may be anywhere in `air`: others are
-        planned round that, and who was released into it stands still, until the drone enters anew.  Returns
-        those for which there is no way."""
+    def is_clear(self, drone: str, air: Iterable[int]) -> bool:
+        """Whether nobody else may be in this air now, or was released into it."""
+        wanted = frozenset(air)
+        near = wanted.union(*(self.conflicts[resource] for resource in wanted))
+        zones = self._zones()
+        return all(
+            near.isdisjoint(course.wreck or course.air) and wanted.isdisjoint(zones.get(other, ()))
+            for other, course in self.drones.items()
+            if other != drone
+        )
+
+    def roam(
+        self, drone: str, place: int, air: Collection[int], doubt_m: float, now_ms: int
+    ) -> tuple[str, ...]:
+        """A drone flies by somebody else's will, is near `place` and may be anywhere in `air`, or `doubt_m`
+        beside: others are planned round that, and who was released into it stands still, until the drone
+        enters anew.  Returns those for which there is no way."""
         course = self.drones[drone]
         projected = self.projected(now_ms)
         before = self.avoided(drone) if course.roams else frozenset()
         course.place, course.wreck, course.roams = place, frozenset((place, *air)), True
         course.ahead, course.stops, course.doubt_m, course.released = [], (), 0.0, course.done
-        zone = within(self.lanes, tuple(course.wreck), self._cell.separation_m, self._cell.upright_m)
+        reach_m = self._cell.separation_m + doubt_m
+        zone = within(self.lanes, tuple(course.wreck), reach_m, self._cell.upright_m)
         self._avoided[drone] = zone
         if zone <= before:
             return ()

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from flightd.adapters.ground_link.messages.published import StatusReport
-from flightd.core.types import OVER, CommandKind, Phase
+from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.dispatcher import DroneReport
 from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action
 from flightd.fleet.vda5050.order import Order
 from flightd.fleet.vehicle.signals import Decided
 from flightd.ground.fleet.base_orders import BaseOrders, instant, scan
+from flightd.ground.fleet.drone_air import DroneAir
 from flightd.ground.fleet.fleet_floor import FleetFloor
 from flightd.ground.mqtt.managed_drone import ManagedDrone
 from flightd.ground.mqtt.order_flight import WAITS
@@ -29,10 +30,11 @@ FLIGHT_S: Final = 3600.0
 _FULL_S: Final = 600.0
 """Of a drone that tells no charge: its own rules bring it home."""
 _DOUBTS_M: Final = 3.0
-"""By how much a drone may be off that looks for its place: a node beside the one that it was at."""
+"""By how much a drone may be off that looks for its place, or tells none: a node beside its own."""
 _SIGMAS: Final = 3.0
 _CALLED_OFF_EVERY_S: Final = 2.0
 _STARTS_WITHIN_S: Final = 60.0
+_IN_AIR: Final = frozenset({*FLYING, Phase.LAND, Phase.RECOVER})
 _CLIMBS: Final = frozenset({Phase.TAKE_OFF, Phase.ACQUIRE})
 
 
@@ -47,7 +49,8 @@ class _Step:
 
 
 class FleetDrone:
-    """`is_ours` says whether traffic may fly it, `air` where it may be while traffic does not."""
+    """`look` at it first.  `is_ours` says whether traffic may fly it, `air` where it may be while traffic
+    does not."""
 
     def __init__(self, name: str, drone: ManagedDrone, floor: FleetFloor, uncertainty_m: float) -> None:
         self.name = name
@@ -58,10 +61,10 @@ class FleetDrone:
         self._done = 0
         self._orders: BaseOrders | None = None
         self._refused = ""
-        self._paused = self._astray = False
+        self._paused = self._was_taken = False
         self._called_off_s = -math.inf
         self._stands_since_s = 0.0
-        self._air: tuple[int, frozenset[int]] = (floor.pad(name), frozenset())
+        self.air = DroneAir(name, floor)
         self._levels = sorted({level for node in floor.nodes for level in node.levels})
         self._sides = {(rack.aisle, rack.side) for rack in floor.racks}
         self._faces = {node.id: node.aisle for node in floor.nodes if node.levels}
@@ -75,6 +78,8 @@ class FleetDrone:
         status = self.drone.status
         if status is None or not self.drone.is_heard or not self.drone.is_automatic or self._refused:
             return False
+        if self.air.is_astray or self.air.is_believed is False:
+            return False
         return status.phase not in FLYING or status.phase is Phase.RELOCATE or self._is_on_base(status)
 
     @property
@@ -85,17 +90,19 @@ class FleetDrone:
             return "it is not heard"
         if not self._floor.is_of(floor):
             return f"it flies by another map: {floor.name}"
-        if self._astray:
-            return "it landed beside its pad; give it back once it stands there again"
-        if self.drone.is_taken:
-            return "a person has it"
+        if self.air.is_astray:
+            return "nothing shows that it stands on its pad; give it back once it does"
+        if self.drone.is_taken or self.air.is_believed is False:
+            return "a person has it" if self.drone.is_taken else "it was started anew in flight"
         if not self.drone.is_automatic:
             return f"it takes no orders now: {status.phase}, {status.reason}".removesuffix(", ")
         return self._refused or "it is not where traffic could fly it on from"
 
     def _is_on_base(self, status: StatusReport) -> bool:
-        vehicle, home = self.drone.vehicle, self._floor.pads[self.name].node
-        return not status.way or status.way[0] in {vehicle.last_node, *vehicle.ahead, home}
+        """By what traffic released: who is paused on a lane has nothing ahead as a vehicle."""
+        base = {self._node_of(step) for step in self._base}
+        vehicle = self.drone.vehicle
+        return not status.way or status.way[0] in base | {vehicle.last_node, *vehicle.ahead}
 
     @property
     def waits(self) -> bool:
@@ -111,7 +118,9 @@ class FleetDrone:
         if status is None or not fits or not self.drone.is_heard or not self.drone.is_automatic:
             return None
         if self.waits:
-            return self._floor.pad(self.name)
+            return self._floor.pad(self.name) if self.air.rests else None
+        if not self.air.is_believed or self._doubt_m(status) > 0.0:
+            return None
         if status.phase is not Phase.HOLD or not self.drone.vehicle.is_idle or status.position is None:
             return None
         node = self._floor.node_at((status.position.x_m, status.position.y_m))
@@ -130,17 +139,17 @@ class FleetDrone:
         ready = status is not None and CommandKind.START in status.possible and standing is not None
         if self.waits and not self._base and not ready:
             charge = 0.0  # nobody sends it anywhere
-        return DroneReport(self.name, self._done, charge, self._doubt_m(status))
+        self.air.doubt_m = self._doubt_m(status)
+        return DroneReport(self.name, self._done, charge, self.air.doubt_m)
 
     def _doubt_m(self, status: StatusReport | None) -> float:
-        if status is None or status.phase not in FLYING:
+        if status is None or status.phase in _CLIMBS or status.phase not in _IN_AIR:
             return 0.0
-        if status.phase is Phase.RELOCATE:
-            return _DOUBTS_M
         at = status.position
-        sigmas = () if at is None else (at.sigma_x_m, at.sigma_y_m)
-        worst_m = _SIGMAS * max((sigma for sigma in sigmas if sigma is not None), default=0.0)
-        return max(worst_m - self._uncertainty_m, 0.0) if status.phase not in _CLIMBS else 0.0
+        if at is None or status.phase in {Phase.RELOCATE, Phase.RECOVER}:
+            return _DOUBTS_M
+        worst_m = _SIGMAS * max((s for s in (at.sigma_x_m, at.sigma_y_m) if s is not None), default=0.0)
+        return max(worst_m - self._uncertainty_m, 0.0)
 
     def _see_done(self) -> None:
         while self._base and self._is_done(self._base[0]):
@@ -155,39 +164,31 @@ class FleetDrone:
         reached = step.sequence is not None and vehicle.last_sequence >= step.sequence
         return reached and (not step.count or vehicle.is_over(step.count))
 
-    def _note_astray(self, status: StatusReport) -> None:
-        """It has landed elsewhere than on its pad, and its daemon may be started anew there, believing to be
-        on the pad: it is a person's then, and lies where it is until he gives it back."""
-        at = status.position
-        if not self._astray and status.phase in OVER and at is not None:
-            self._astray = not self._floor.is_pad(self.name, (at.x_m, at.y_m))
-            if self._astray:
-                self.drone.taken_by_person()
+    def look(self) -> None:
+        """See what it told, as often as anything is decided by it."""
+        drone = self.drone
+        if self._was_taken and not drone.is_taken:
+            self.air.give_back()
+        ordered = not drone.is_heard and bool(self._base or drone.vehicle.ahead)
+        was_astray = self.air.is_astray
+        self.air.see(drone.status, stood=drone.standing is not None, ordered=ordered)
+        if self.air.is_astray and not was_astray:
+            drone.taken_by_person()  # it lies where it is until he gives it back
+        self._was_taken = drone.is_taken
+
+    def close_air(self) -> None:
+        """Traffic does not fly it: it may be on all that it was released to, ordered, or tells, and near."""
+        status, vehicle = self.drone.status, self.drone.vehicle
+        told = () if status is None else status.way
+        base = [self._node_of(step) for step in self._base]
+        self.air.close([(vehicle.last_node, *vehicle.ahead), told, base], self._doubt_m(status))
 
     @property
-    def air(self) -> tuple[int, frozenset[int]]:
-        """A vertex near it, and all where it may be while somebody else flies it: on its way, and home."""
-        status, pad = self.drone.status, self._floor.pad(self.name)
-        if status is None:
-            return self._air
-        at = None if status.position is None else (status.position.x_m, status.position.y_m)
-        armed = status.vehicle is None or status.vehicle.armed
-        if self._astray and not armed:
-            return self._air
-        if not armed and at is not None and self._floor.is_pad(self.name, at):
-            self._air = pad, frozenset()
-        elif at is not None and self.drone.is_heard:
-            here = self._floor.nearest(at)
-            ahead = (*self.drone.vehicle.ahead, *status.way) if armed else ()
-            air = self._floor.way(self.name, (here, *ahead)) if armed else frozenset[int]()
-            self._air = self._floor.lanes.over(here), air | self._floor.around(at)
-        elif not self.drone.is_heard:
-            here = self._floor.lanes.vertices[self._air[0]].node
-            ordered = [self._node_of(step) for step in self._base]
-            gone = self._floor.way(self.name, (here, *status.way, *ordered))
-            self._air = self._air[0], self._air[1] | gone
-        self._note_astray(status)
-        return self._air
+    def way_home(self) -> frozenset[int]:
+        """The air of the way that it would fly home from where it holds."""
+        status = self.drone.status
+        here = () if status is None else status.way[:1]
+        return self._floor.way(self.name, here)
 
     def _node_of(self, step: _Step) -> str:
         return self._floor.lanes.vertices[step.action.vertex].node
@@ -197,7 +198,8 @@ class FleetDrone:
     def begin(self) -> None:
         """Traffic flies it from now on, from where it rests; nothing of before is left."""
         self._base.clear()
-        self._done, self._orders, self._refused, self._astray = 0, None, "", False
+        self._done, self._orders, self._refused = 0, None, ""
+        self.air.begin()
         self.drone.flies = self.drone.lands = False
         self.drone.has_more = True
         if self._paused:

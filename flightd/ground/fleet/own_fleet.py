@@ -24,6 +24,7 @@ from flightd.ground.hub import Hub
 from flightd.ground.messages import Act, LinkPicture, PictureKey
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.ground.mqtt.safe_return import Standing
+from flightd.mission.plan.leg_times import Pace
 
 TRAFFIC: Final = Identity("fleet traffic", Role.OPERATOR, "local")
 """Whose orders they are, in the audit."""
@@ -41,6 +42,7 @@ class OwnFleet:
         self._drones = {name: ManagedDrone(name, VERSION, measures, rules) for name in drones}
         for drone in self._drones.values():
             drone.at_broker = True  # who gives the orders is always there
+        self._fleet: tuple[FleetFloor, dict[str, FleetDrone], Pace] | None = None
         self._traffic: StationTraffic | None = None
         self._trouble = ""
         self._hub: Hub | None = None
@@ -52,15 +54,26 @@ class OwnFleet:
             for name, drone in self._drones.items():
                 drone.on_taken = partial(_tell_page, hub, name)
                 _tell_page(hub, name, False)
-                tasks.create_task(drone.run(hub.drones[name]), name=f"{name} as a vehicle")
+                tasks.create_task(self._keep(name, drone, hub), name=f"{name} as a vehicle")
             tasks.create_task(self._control(), name="traffic")
 
+    async def _keep(self, name: str, drone: ManagedDrone, hub: Hub) -> None:
+        """An error about one drone ends neither the others' flights nor the station."""
+        while True:
+            try:
+                await drone.run(hub.drones[name])
+            except Exception:  # noqa: BLE001 - it is flown round, as one that nobody commands
+                _LOG.error("%s: what stepped it failed, and begins anew", name, exc_info=True)
+                drone.is_automatic = False
+            await asyncio.sleep(_AGAIN_S)
+
     async def leave(self) -> None:
-        """Have everybody who flies by traffic hold where he is.  Call it when `run` has ended, before the
-        links do."""
-        hub, flown = self._hub, self._traffic.flown if self._traffic is not None else ()
+        """Have everybody who flies, and whom no person has, hold where he is.  Call it when `run` has ended,
+        before the links do."""
+        hub = self._hub
         if hub is not None:
-            flying = [hub.drones[name] for name in flown if hub.drones[name].flies]
+            ours = (hub.drones[name] for name, drone in self._drones.items() if drone.is_automatic)
+            flying = [drone for drone in ours if drone.flies]
             halts = [drone.act(_act(CommandKind.PAUSE), by_person=False) for drone in flying]
             for drone, came in zip(flying, await asyncio.gather(*halts, return_exceptions=True), strict=True):
                 if isinstance(came, BaseException):
@@ -77,12 +90,17 @@ class OwnFleet:
             except Exception as err:  # noqa: BLE001 - the station goes on; nobody is released to more
                 _LOG.error("the traffic of the fleet failed, and begins anew", exc_info=True)
                 self._traffic, self._trouble = None, f"it failed: {err}"
+                for drone in self._drones.values():
+                    drone.may_go_home = False  # nobody knows who is in its way
                 await asyncio.sleep(_AGAIN_S)
             await asyncio.sleep(_STEP_S)
 
     def _assemble(self) -> None:
         """Once every drone has told its map and where it stands: nobody flies before, for each may be
-        anywhere."""
+        anywhere.  Where each may be is known on when traffic has failed."""
+        if self._fleet is not None:
+            self._traffic, self._trouble = StationTraffic(*self._fleet, self._cell), ""
+            return
         floors: dict[str, FloorStatus] = {}
         standings: dict[str, Standing] = {}
         for name, drone in self._drones.items():
@@ -104,7 +122,8 @@ class OwnFleet:
             name: FleetDrone(name, drone, floor, self._cell.uncertainty_m)
             for name, drone in self._drones.items()
         }
-        self._traffic = StationTraffic(floor, drones, pace_of(standings.values()), self._cell)
+        self._fleet = floor, drones, pace_of(standings.values())
+        self._traffic = StationTraffic(*self._fleet, self._cell)
 
     # what is asked of it
 

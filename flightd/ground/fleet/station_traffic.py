@@ -45,7 +45,7 @@ class StationTraffic:
         self._dispatcher = Dispatcher(self._control, self._queue, _ENDURANCE, shares=True)
         self._dwell_ms = int(pace.dwell_s * 1000)
         self._flown: set[str] = set()
-        self._airs: dict[str, tuple[int, frozenset[int]]] = {}
+        self._airs: dict[str, tuple[int, frozenset[int], float]] = {}
         for name in drones:
             self._control.enter(name, floor.pad(name))
 
@@ -68,6 +68,7 @@ class StationTraffic:
     def step(self, now_ms: int) -> None:
         """Once round."""
         for name, drone in self._drones.items():
+            drone.look()
             if name in self._flown and not drone.is_ours:
                 self._flown.discard(name)
             if name not in self._flown:
@@ -81,11 +82,13 @@ class StationTraffic:
 
     def _lead_back(self, name: str, drone: FleetDrone, now_ms: int) -> None:
         """Keep others out of a drone's air until it rests, and then fly it again."""
-        air = drone.air
+        drone.close_air()
+        air = drone.air.place, drone.air.closed, drone.air.doubt_m
         if self._airs.get(name) != air:
             self._airs[name] = air
             self._dispatcher.withdraw(name, *air, now_ms)
         drone.call_off(now_ms / 1000)
+        drone.drone.may_go_home = self._control.is_clear(name, drone.way_home)
         rests_at = drone.rests_at
         if rests_at is not None and self._dispatcher.readmit(name, rests_at, self._floor.pad(name), now_ms):
             del self._airs[name]

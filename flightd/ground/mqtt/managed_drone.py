@@ -101,6 +101,8 @@ class ManagedDrone:
         """As `Wish`: whoever gives the orders sets them."""
         self.has_more = False
         """A drone that holds without an order waits for one that will come."""
+        self.may_go_home = True
+        """Nobody is in its way home: it may be sent there."""
         self.is_automatic = False
         """The manager may fly it, by what it told last."""
         self._messages: dict[type[Header], Header] = {}
@@ -359,7 +361,8 @@ class ManagedDrone:
             return None
         self._rests_since_s = now_s if self._rests_since_s is None else self._rests_since_s
         assert self._rules is not None
-        return CommandNext(CommandKind.HOME) if now_s - self._rests_since_s >= self._rules.hold_s else None
+        is_due = self.may_go_home and now_s - self._rests_since_s >= self._rules.hold_s
+        return CommandNext(CommandKind.HOME) if is_due else None
 
     async def _ask(self, now_s: float, link: DroneLink) -> None:
         """Where it stands, and how far it could fly."""

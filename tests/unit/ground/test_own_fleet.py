@@ -14,12 +14,13 @@ from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.cells import CellSize
 from flightd.fleet.traffic.dispatcher import Dispatcher
+from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.fleet.fleet_floor import FleetFloor
 from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.hub import Hub
 from flightd.ground.messages import Act
-from flightd.ground.mqtt.managed_drone import OrderRules
+from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.sim.fleet.judge import FleetJudge
 from flightd.site.site import Site
 from tests.rigs.event_loops import virtual
@@ -163,6 +164,9 @@ def test_who_is_silent_has_his_way_home_to_himself_until_he_is_heard() -> None:
         await until(lambda: b.phase is Phase.DONE, 200)  # nobody pauses it at the end of its base
         assert fleet.state["done"] == [], "nobody was sent into its way"
         b.heard = True
+        await until(lambda: fleet.pages["b", "manager"] == {"flies": False})
+        assert fleet.state["done"] == [], "nothing shows where it landed"
+        assert fleet.own.hand_over("b", to_manager=True)
         await until(lambda: fleet.state["done"] == ["B2"], 300)
         b.begin_anew()
         await until(lambda: "B3" in fleet.state["done"], 300)
@@ -170,24 +174,172 @@ def test_who_is_silent_has_his_way_home_to_himself_until_he_is_heard() -> None:
     fly(go)
 
 
-def test_a_drone_that_landed_in_an_aisle_is_flown_round_until_a_person_says_that_it_is_away() -> None:
+@pytest.mark.parametrize("restarts_at_once", [False, True])
+def test_a_drone_that_landed_in_an_aisle_is_flown_round_until_a_person_says_that_it_is_away(
+    restarts_at_once: bool,
+) -> None:
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
         fleet.own.ask(["B3"], "b")
         await until(lambda: b.phase is Phase.HOVER and b.way[0] == "B3", 100)
-        b.phase, b.way = Phase.LAND, []  # a hazard
-        await until(lambda: b.phase is Phase.DONE)
+        b.come_down()  # a hazard
+        await until(lambda: b.phase is Phase.ABORTED)
+        if restarts_at_once:
+            b.begin_anew(on_pad=False)
         fleet.own.ask(["A4", "B3"])
         await until(lambda: fleet.state["done"] == ["A4"], 300)
-        await until(lambda: fleet.drones["c"].phase is Phase.DONE, 300)
-        assert (fleet.state["done"], fleet.flown("b")) == (["A4"], False)
-        b.begin_anew()
+        b.begin_anew(on_pad=False)
         await asyncio.sleep(60.0)
         assert (fleet.state["done"], fleet.flown("b")) == (["A4"], False), "it may lie there still"
+        b.begin_anew()
+        await asyncio.sleep(10.0)
+        assert not fleet.flown("b"), "nobody said that it was put back"
         fleet.own.hand_over("b", to_manager=True)
         await until(lambda: fleet.state["done"] == ["A4", "B3"], 300)
 
     fly(go)
+
+
+def test_a_drone_whose_daemon_begins_anew_in_flight_keeps_its_air() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.HOVER and b.way[0] == "B3", 100)
+        b.begin_anew(on_pad=False)
+        assert b.phase is Phase.RECOVER
+        fleet.own.ask(["B3"], "c")
+        await until(lambda: b.phase is Phase.ABORTED)
+        await asyncio.sleep(60.0)
+        assert (fleet.state["done"], fleet.flown("b")) == ([], False)
+
+    fly(go, "bc")
+
+
+@pytest.mark.parametrize("asked", ["B2", "A3"], ids=["on its way", "as far as it may be off"])
+def test_who_comes_down_without_a_place_is_not_put_back_on_its_pad(asked: str) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        b.sees = False
+        b.come_down()
+        await until(lambda: not fleet.flown("b"))
+        fleet.own.ask([asked], "c")
+        await asyncio.sleep(60.0)
+        assert fleet.state["done"] == []
+
+    fly(go, "bc")
+
+
+def test_a_pause_between_two_nodes_leaves_a_drone_to_traffic(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        with monkeypatch.context() as patched:
+            patched.setattr(TrafficControl, "paused", lambda _: frozenset({"b"}))
+            await until(lambda: b.phase is Phase.HOLD)
+            await asyncio.sleep(30.0)
+            assert (fleet.flown("b"), b.phase) == (True, Phase.HOLD)
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert (fleet.state["done"], "home" in b.commands) == (["B3"], False)
+
+    fly(go, "b")
+
+
+def test_who_was_paused_as_traffic_failed_is_flown_on_by_the_new_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.HOVER and b.way[0] == "B2", 100)
+        with monkeypatch.context() as patched:
+            patched.setattr(TrafficControl, "paused", lambda _: frozenset({"b"}))
+            await until(lambda: b.phase is Phase.HOLD)
+            patched.setattr(Dispatcher, "step", lambda *_: 1 / 0)
+            await until(lambda: not fleet.state["flies"])
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert "home" not in b.commands
+
+    fly(go, "b")
+
+
+def test_no_drone_is_sent_home_through_the_air_of_another_one() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        fleet.own.ask(["B4"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B4", 100)
+        await b.act(Act("by-ann-1", CommandKind.PAUSE))
+        await until(lambda: b.phase is Phase.HOLD)
+        a.begin_anew()
+        a.phase, a.way, a.paused = Phase.HOLD, ["A2", "A1", "A1"], True
+        at = a.site.nodes["B2"]
+        a.truth.x_m, a.truth.y_m, a.truth.z_m = at.x_m, at.y_m, 1.5
+        await until(lambda: not fleet.flown("a"))
+        fleet.own.hand_over("b", to_manager=True)
+        await asyncio.sleep(60.0)
+        assert (b.phase, b.commands[-1]) == (Phase.HOLD, "pause")
+        a.begin_anew()
+        await until(lambda: fleet.pages["a", "manager"] == {"flies": False})
+        fleet.own.hand_over("a", to_manager=True)
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert b.commands[-1] == "home"
+
+    fly(go, "ab")
+
+
+def test_who_makes_for_home_by_himself_is_flown_by_somebody_else() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B4"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        b.way = ["B1", "B1"]
+        await until(lambda: not fleet.flown("b"), 5)
+
+    fly(go, "b")
+
+
+def test_the_end_halts_who_flies_while_traffic_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a = fleet.drones["a"]
+        fleet.own.ask(["A3"])
+        await until(lambda: a.phase is Phase.FOLLOW and a.way[0] == "A2", 100)
+        monkeypatch.setattr(Dispatcher, "step", lambda *_: 1 / 0)
+        await until(lambda: not fleet.state["flies"])
+        assert not a.paused
+
+    assert fly(go, "a").drones["a"].paused
+
+
+def test_where_traffic_fails_what_it_knows_of_a_drone_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.HOVER and b.way[0] == "B3", 100)
+        b.come_down()
+        await until(lambda: b.phase is Phase.ABORTED)
+        b.begin_anew(on_pad=False)
+        with monkeypatch.context() as patched:
+            patched.setattr(Dispatcher, "step", lambda *_: 1 / 0)
+            await until(lambda: not fleet.state["flies"])
+        a.heard = False
+        await until(lambda: fleet.state["flies"])
+        fleet.own.ask(["B3"], "c")
+        await asyncio.sleep(60.0)
+        assert fleet.state["done"] == []
+
+    fly(go)
+
+
+def test_an_error_about_one_drone_ends_no_other_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        with monkeypatch.context() as patched:
+            patched.setattr(ManagedDrone, "_step", lambda *_: 1 / 0)
+            await asyncio.sleep(1.0)
+        await until(lambda: fleet.flown("a") and fleet.flown("b"))
+        fleet.own.ask(["A2"], "a")
+        await until(lambda: fleet.state["done"] == ["A2"], 200)
+
+    fly(go, "ab")
 
 
 def test_what_another_station_commands_takes_a_drone_and_the_end_halts_the_others() -> None:

@@ -1,0 +1,102 @@
+"""Where a drone may be while traffic does not fly it.
+
+That only ever grows: what such a drone tells is no proof that it left any air for good.  It ends when the
+drone rests on its own pad at the end of a flight, when a person gives it back, or when traffic flies it on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flightd.adapters.ground_link.messages.published import StatusReport
+from flightd.core.types import OVER, Phase
+from flightd.ground.fleet.fleet_floor import FleetFloor
+from flightd.ground.mqtt.order_flight import WAITS
+
+
+class DroneAir:
+    """`see` it often, `close` it while traffic does not fly the drone.  At first it rests on its pad."""
+
+    def __init__(self, drone: str, floor: FleetFloor) -> None:
+        self._drone = drone
+        self._floor = floor
+        self.place = floor.pad(drone)
+        """A vertex near the drone."""
+        self.closed: frozenset[int] = frozenset()
+        self.doubt_m = 0.0
+        """By how much it may be beside all that."""
+        self.rests = True
+        """It stands on its own pad, for certain."""
+        self.is_astray = False
+        """It is on the ground, and nothing shows that it is on its own pad."""
+        self.is_believed: bool | None = None
+        """Its session began on the ground, so that its position is none that it took for granted; None: not
+        told yet."""
+        self._session = ""
+        self._armed = self._flew = False
+        self._at: tuple[float, float] | None = None
+        """Told last while armed: a drone on the ground tells none."""
+
+    def see(self, status: StatusReport | None, *, stood: bool, ordered: bool) -> None:
+        """What it told last; `stood`: in this session it told where it stands; `ordered`: it is silent, and
+        may fly what it was ordered."""
+        if status is not None:
+            self._see_session(status, stood=stood)
+            self._see_flight(status)
+        if ordered:
+            self.rests = False
+
+    def _see_session(self, status: StatusReport, *, stood: bool) -> None:
+        if status.session != self._session:
+            self.is_astray |= bool(self._session) and not self.rests
+            self._session, self.is_believed, self._flew = status.session, None, False
+        vehicle = status.vehicle
+        self._armed = vehicle.armed if vehicle is not None else status.phase not in WAITS | OVER
+        if status.phase is Phase.RECOVER:
+            self.is_believed = False
+        elif self.is_believed is None and vehicle is not None:
+            self.is_believed = stood or not vehicle.armed
+
+    def _see_flight(self, status: StatusReport) -> None:
+        if self._armed:
+            self.rests, self._flew = False, True
+            if self.is_believed and status.position is not None:
+                self._at = status.position.x_m, status.position.y_m
+        elif status.vehicle is None or self.rests or self.is_astray:
+            return
+        elif status.phase in OVER:
+            is_home = self._at is not None and self._floor.is_pad(self._drone, self._at)
+            if status.phase is Phase.DONE and self.is_believed and is_home:
+                self._rest()
+            else:
+                self.is_astray = True
+        elif status.phase is Phase.PREFLIGHT and not self._flew:
+            self._rest()
+
+    def close(self, ways: Sequence[Sequence[str]], doubt_m: float) -> None:
+        """It may be on these ways, over nodes, from where it was seen last, and on its way home."""
+        if self.rests:
+            return
+        floor = self._floor
+        here = floor.pads[self._drone].node if self._at is None else floor.nearest(self._at)
+        around = frozenset[int]() if self._at is None else floor.around(self._at)
+        found = (floor.way(self._drone, (here, *way)) for way in ((), *ways))
+        self.closed = self.closed.union([self.place], around, *found)
+        self.place = floor.lanes.over(here)
+        self.doubt_m = max(self.doubt_m, doubt_m)
+
+    def give_back(self) -> None:
+        """A person says that on the ground it stands on its pad, and in the air it is where it tells."""
+        self.is_astray = False
+        if not self._armed:
+            self._rest()
+        elif self.is_believed:
+            self.begin()
+
+    def begin(self) -> None:
+        """Traffic flies it, from where it rests."""
+        self.closed, self.doubt_m = frozenset(), 0.0
+
+    def _rest(self) -> None:
+        self.rests, self._at, self.place = True, None, self._floor.pad(self._drone)
+        self.begin()

@@ -1,0 +1,103 @@
+"""What is known of a drone that traffic does not fly: it only grows, until the drone is proved to rest."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from flightd.adapters.ground_link.floor_status import floor_status
+from flightd.adapters.ground_link.messages.published import Position, StatusReport
+from flightd.core.types import Phase
+from flightd.fleet.traffic.cells import CellSize
+from flightd.ground.fleet.drone_air import DroneAir
+from flightd.ground.fleet.fleet_floor import FleetFloor
+from tests.rigs.paper_drones import PADS, PaperDrone, hall
+
+FLOOR = FleetFloor({name: floor_status(hall(name)) for name in PADS}, PADS, CellSize())
+PAD = FLOOR.pad("b")
+GROUND = PaperDrone("b", hall("b"), lambda *_: None).status
+B2, B3, A3 = (FLOOR.lanes.over(node) for node in ("B2", "B3", "A3"))
+
+
+def told(
+    phase: Phase, node: str = "", *, session: str = "b 1", armed: bool = True, off_m: float = 0.0
+) -> StatusReport:
+    """As a drone over a node tells it, without one as one that knows no place."""
+    assert GROUND.vehicle is not None
+    vehicle = msgspec.structs.replace(GROUND.vehicle, armed=armed)
+    at = None
+    if node:
+        vertex = FLOOR.lanes.vertices[FLOOR.lanes.over(node)]
+        at = Position(vertex.x_m + off_m, vertex.y_m, 0.0, 0.0, 1.0, 0.02, 0.02)
+    return msgspec.structs.replace(GROUND, session=session, phase=phase, vehicle=vehicle, position=at)
+
+
+def seen(*statuses: StatusReport) -> DroneAir:
+    """First on the ground, then this."""
+    air = DroneAir("b", FLOOR)
+    for status in (GROUND, *statuses):
+        air.see(status, stood=status.session == GROUND.session, ordered=False)
+        air.close([], 0.0)
+    return air
+
+
+DOWN = told(Phase.DONE, armed=False)
+
+
+@pytest.mark.parametrize(
+    ("statuses", "rests", "astray"),
+    [
+        ((), True, False),
+        ((told(Phase.PREFLIGHT, armed=False, session="b 2"),), True, False),
+        ((told(Phase.FOLLOW, "B3"), told(Phase.LAND, "B1"), DOWN), True, False),
+        ((told(Phase.FOLLOW, "B3"), DOWN), False, True),
+        ((told(Phase.LAND), DOWN), False, True),
+        ((told(Phase.LAND, "B1"), told(Phase.ABORTED, armed=False)), False, True),
+        ((told(Phase.LAND, "B1"), told(Phase.PREFLIGHT, armed=False, session="b 2")), False, True),
+        ((told(Phase.LAND, "B3"), told(Phase.RECOVER, "B1", session="b 2"), DOWN), False, True),
+        ((told(Phase.FOLLOW, "B3", session="b 2"), told(Phase.LAND, "B1", session="b 2")), False, False),
+    ],
+)
+def test_only_the_end_of_a_flight_that_was_seen_over_its_pad_proves_that_it_rests(
+    statuses: tuple[StatusReport, ...], rests: bool, astray: bool
+) -> None:
+    air = seen(*statuses)
+    assert (air.rests, air.is_astray, air.closed == frozenset()) == (rests, astray, rests)
+    air.give_back()
+    assert not air.is_astray
+
+
+def test_air_grows_from_where_it_was_seen_last_and_over_all_that_it_was_released_to() -> None:
+    air = seen(told(Phase.FOLLOW, "B2", off_m=0.8))
+    lane = FLOOR.around((0.8 + FLOOR.lanes.vertices[B2].x_m, FLOOR.lanes.vertices[B2].y_m))
+    assert lane
+    assert lane <= air.closed, "the lane in hand"
+    air.see(told(Phase.FOLLOW), stood=True, ordered=True)
+    air.close([["A3"]], 3.0)
+    assert {A3, B2, PAD} | lane <= air.closed
+    air.see(told(Phase.FOLLOW, "B1"), stood=True, ordered=False)
+    air.close([], 0.0)
+    assert (A3 in air.closed, air.doubt_m) == (True, 3.0), "until it rests"
+    air.give_back()
+    assert (air.closed, air.doubt_m) == (frozenset(), 0.0)
+
+
+def test_a_position_of_a_session_that_began_in_the_air_is_not_believed() -> None:
+    air = seen(told(Phase.HOVER, "B3"), told(Phase.RECOVER, "B1", session="b 2"))
+    assert (air.place, air.is_believed, B3 in air.closed) == (B3, False, True)
+    air.give_back()
+    assert B3 in air.closed, "he cannot know where it is, either"
+
+
+def test_who_is_silent_with_an_order_may_have_flown() -> None:
+    air = seen()
+    air.see(GROUND, stood=True, ordered=True)
+    air.close([["B3"]], 0.0)
+    assert B3 in air.closed
+    air.see(told(Phase.PREFLIGHT, armed=False, session="b 2"), stood=False, ordered=False)
+    assert air.is_astray
+
+    air = seen()
+    air.see(GROUND, stood=True, ordered=True)
+    air.see(GROUND, stood=True, ordered=False)
+    assert air.rests, "in the same session, never armed"
