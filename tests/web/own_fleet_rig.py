@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import random
+import time
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -73,11 +74,10 @@ class Fleet:
 
     async def until_told(self, key: str, holds: Callable[[Any], bool], within_s: float = 120.0) -> None:
         """The station tells it so of its fleet.  Fails where it does not in time."""
-        async with asyncio.timeout(within_s):
-            while True:
-                if holds((await self.state())[key]):
-                    return
-                await asyncio.sleep(30 * _LOOK_S)
+        last_s = time.monotonic() + within_s
+        while not holds((told := await self.state())[key]):
+            assert time.monotonic() < last_s, f"{key} in {within_s:g} s: {told}"
+            await asyncio.sleep(30 * _LOOK_S)
 
     async def state(self) -> dict[str, Any]:
         """As the station tells it."""

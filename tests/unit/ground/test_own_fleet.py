@@ -287,17 +287,6 @@ def test_no_drone_is_sent_home_through_the_air_of_another_one() -> None:
     fly(go, "ab")
 
 
-def test_who_makes_for_home_by_himself_is_flown_by_somebody_else() -> None:
-    async def go(fleet: PaperFleet) -> None:
-        b = fleet.drones["b"]
-        fleet.own.ask(["B4"], "b")
-        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
-        b.way = ["B1", "B1"]
-        await until(lambda: not fleet.flown("b"), 5)
-
-    fly(go, "b")
-
-
 def test_the_end_halts_who_flies_while_traffic_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     async def go(fleet: PaperFleet) -> None:
         a = fleet.drones["a"]
