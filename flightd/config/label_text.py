@@ -9,17 +9,8 @@ from typing import Final, Literal, Self
 from pydantic import Field, model_validator
 
 from flightd.config.section import Section
-from flightd.core.label_values import ValueKind
+from flightd.core.label_values import DATES, ValueKind
 
-DATES: Final = frozenset(
-    (
-        ValueKind.PRODUCTION_DATE,
-        ValueKind.PACKAGING_DATE,
-        ValueKind.BEST_BEFORE,
-        ValueKind.SELL_BY,
-        ValueKind.EXPIRY,
-    )
-)
 _A_DAY: Final = datetime(2031, 12, 30)  # noqa: DTZ001 - a date alone
 _DIRECTIVES: Final = frozenset("dmyYbBj")
 

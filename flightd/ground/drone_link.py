@@ -6,7 +6,8 @@ import asyncio
 import logging
 import math
 from collections import Counter, deque
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar
 
 from flightd.adapters.ground_link.client import Address, GroundClient
@@ -142,21 +143,13 @@ class DroneLink:
         """Hand an act to the drone; its answer.  As `GroundClient` raises; RunError where too many wait."""
         if by_person:
             self._note_person()
-        client = self._client
-        if client is None:
-            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
-        if self._acting >= MOST_ACTS and act.command not in _URGENT:
-            raise RunError(f"{MOST_ACTS} acts wait for an answer of {self.name} already")
-        self._acting += 1
-        try:
+        with self._one_more_act(urgent=act.command in _URGENT) as client:
             if act.command in _URGENT:  # whatever flies there now
                 return await client.order(act.command, act.node, act.id, session="", seen_ns=0)
             session, seen_ns = act.session or None, act.seen_ns or None
             return await client.order(
                 act.command, act.node, act.id, session=session, seen_ns=seen_ns, plan=act.plan
             )
-        finally:
-            self._acting -= 1
 
     async def plan_flight(
         self,
@@ -173,13 +166,7 @@ class DroneLink:
         """Hand the drone the nodes of its next flight, or ask what that would be.  As `act` raises."""
         if by_person and not dry:
             self._note_person()
-        client = self._client
-        if client is None:
-            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
-        if self._acting >= MOST_ACTS:
-            raise RunError(f"{MOST_ACTS} acts wait for an answer of {self.name} already")
-        self._acting += 1
-        try:
+        with self._one_more_act() as client:
             return await client.plan_flight(
                 nodes,
                 levels,
@@ -189,8 +176,24 @@ class DroneLink:
                 session=session or None,
                 seen_ns=seen_ns or None,
             )
+
+    @contextmanager
+    def _one_more_act(self, *, urgent: bool = False) -> Iterator[GroundClient]:
+        """Who hands it over, while it waits for its answer."""
+        client = self._reached
+        if self._acting >= MOST_ACTS and not urgent:
+            raise RunError(f"{MOST_ACTS} acts wait for an answer of {self.name} already")
+        self._acting += 1
+        try:
+            yield client
         finally:
             self._acting -= 1
+
+    @property
+    def _reached(self) -> GroundClient:
+        if self._client is None:
+            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
+        return self._client
 
     def _note_person(self) -> None:
         self.by_person_at_s = asyncio.get_running_loop().time()
@@ -199,10 +202,9 @@ class DroneLink:
     async def ask(self, question: Callable[[GroundClient], Awaitable[_T]]) -> _T:
         """What the drone answers to a question of who looks after it.  As `GroundClient` raises;
         UnavailableError where it cannot be reached, or too many ask at once."""
-        if self._client is None:
-            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
+        client = self._reached
         with self._questions.taken():
-            return await question(self._client)
+            return await question(client)
 
     async def inventory(self) -> tuple[dict[str, str], ...]:
         """What it has counted on this flight, place by place: asked once for all that want to know now.
@@ -210,9 +212,7 @@ class DroneLink:
         return await self._inventory.answer()
 
     async def _asked_inventory(self) -> tuple[dict[str, str], ...]:
-        if self._client is None:
-            raise UnavailableError(f"{self.name} cannot be reached: {self._trouble}")
-        return await self._client.inventory()
+        return await self._reached.inventory()
 
     async def _connected(self) -> None:
         """Everything on one connection, until something of it fails."""

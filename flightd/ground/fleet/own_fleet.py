@@ -6,8 +6,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import uuid
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from flightd.adapters.ground_link.messages.floor import FloorStatus
@@ -21,9 +20,10 @@ from flightd.ground.fleet.fleet_drone import FleetDrone
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor
 from flightd.ground.fleet.station_traffic import StationTraffic, pace_of
 from flightd.ground.hub import Hub
-from flightd.ground.messages import Act, LinkPicture, PictureKey
+from flightd.ground.messages import Act
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.ground.mqtt.safe_return import Standing
+from flightd.ground.mqtt.vehicle_sides import VehicleSides
 from flightd.mission.plan.leg_times import Pace
 
 TRAFFIC: Final = Identity("fleet traffic", Role.OPERATOR, "local")
@@ -33,13 +33,13 @@ _STEP_S: Final = 0.25
 _AGAIN_S: Final = 5.0
 
 
-class OwnFleet:
-    """A viewer of the hub (`hub.Viewer`) and the manager of its drones (`manager_routes.Managers`); `run` is
-    a task beside the hub's, `leave` ends it with everybody holding where he is."""
+class OwnFleet(VehicleSides):
+    """The manager of the station's own drones; `run` is a task beside the hub's, `leave` ends it with
+    everybody holding where he is."""
 
     def __init__(self, drones: Iterable[str], measures: Measures, rules: OrderRules) -> None:
         self._cell = CellSize(body_m=max(measures.length_m, measures.width_m), upright_m=WHOLE_AIR_M)
-        self._drones = {name: ManagedDrone(name, VERSION, measures, rules) for name in drones}
+        super().__init__({name: ManagedDrone(name, VERSION, measures, rules) for name in drones})
         for drone in self._drones.values():
             drone.at_broker = True  # who gives the orders is always there
         self._fleet: tuple[FleetFloor, dict[str, FleetDrone], Pace] | None = None
@@ -50,10 +50,9 @@ class OwnFleet:
     async def run(self, hub: Hub) -> None:
         """Fly them until cancelled."""
         self._hub = hub
+        self.follow(hub)
         async with asyncio.TaskGroup() as tasks:
             for name, drone in self._drones.items():
-                drone.on_taken = partial(_tell_page, hub, name)
-                _tell_page(hub, name, False)
                 tasks.create_task(self._keep(name, drone, hub), name=f"{name} as a vehicle")
             tasks.create_task(self._control(), name="traffic")
 
@@ -141,34 +140,6 @@ class OwnFleet:
         told = {} if self._traffic is None else self._traffic.document()
         return {"flies": self._traffic is not None, "trouble": self._trouble, **told}
 
-    # as `Managers` and `hub.Viewer`
-
-    def hand_over(self, name: str, *, to_manager: bool) -> bool:
-        """As `Managers`."""
-        drone = self._drones.get(name)
-        if drone is not None:
-            drone.taken_by_person(not to_manager)
-        return drone is not None
-
-    def flies(self, name: str) -> bool:
-        """As `Managers`."""
-        return name in self._drones and not self._drones[name].is_taken
-
-    def attach(self, wake: Callable[[], object] | None) -> None:
-        """No pictures are wanted here."""
-
-    def tell(self, drone: str, topic: str, value: Any) -> None:
-        """As `hub.Viewer`."""
-        if drone in self._drones:
-            self._drones[drone].tell(topic, value)
-
-    def show(self, key: PictureKey, picture: LinkPicture) -> None:
-        """No pictures are wanted here."""
-
-    def has_use_for(self, key: PictureKey) -> bool:  # noqa: ARG002 - as the protocol has it
-        """No pictures are wanted here."""
-        return False
-
 
 async def stop_all(hub: Hub) -> dict[str, str]:
     """STOP to every drone of the station; for each why not, or nothing."""
@@ -186,7 +157,3 @@ async def stop_all(hub: Hub) -> dict[str, str]:
 
 def _act(kind: CommandKind) -> Act:
     return Act(f"fleet-{uuid.uuid4().hex}", kind)
-
-
-def _tell_page(hub: Hub, name: str, taken: bool) -> None:
-    hub.tell(name, "manager", {"flies": not taken})

@@ -9,8 +9,7 @@ import asyncio
 import contextlib
 import logging
 import secrets
-from collections.abc import Callable, Iterable
-from functools import partial
+from collections.abc import Iterable
 from typing import Any, Final
 
 import aiomqtt
@@ -24,9 +23,9 @@ from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.fleet.vehicle.signals import Input, Malformed
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.hub import Hub
-from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.mqtt.broker_address import BrokerAddress
 from flightd.ground.mqtt.managed_drone import MANUFACTURER, ManagedDrone, OrderRules
+from flightd.ground.mqtt.vehicle_sides import VehicleSides
 
 MANAGER: Final = Identity("fleet manager", Role.OPERATOR, "mqtt")
 """Whose orders they are, in the audit."""
@@ -148,9 +147,8 @@ class DroneAtBroker:
         return f"{self._topic}/{TOPICS[kind]}"
 
 
-class FleetLink:
-    """A viewer of the hub (`hub.Viewer`) with the given drones; `run` is a task beside the hub's.  With
-    `rules` the manager may fly them."""
+class FleetLink(VehicleSides):
+    """The given drones at a broker; with `rules` its manager flies them.  `run` goes beside the hub's."""
 
     def __init__(
         self,
@@ -160,53 +158,18 @@ class FleetLink:
         measures: Measures,
         rules: OrderRules | None = None,
     ) -> None:
-        self._takes_orders = rules is not None
-        self._drones = {name: ManagedDrone(name, version, measures, rules) for name in drones}
-        self._at_broker = [
-            DroneAtBroker(name, broker, version, drone) for name, drone in self._drones.items()
-        ]
+        managed = {name: ManagedDrone(name, version, measures, rules) for name in drones}
+        super().__init__(managed, takes_orders=rules is not None)
+        self._at_broker = [DroneAtBroker(name, broker, version, drone) for name, drone in managed.items()]
 
     async def run(self, hub: Hub) -> None:
         """Keep all at the broker until cancelled, and fly as they are ordered."""
+        self.follow(hub)
         async with asyncio.TaskGroup() as tasks:
             for name, drone in self._drones.items():
-                if self._takes_orders:
-                    drone.on_taken = partial(_tell_page, hub, name)
-                    _tell_page(hub, name, False)
                 tasks.create_task(drone.run(hub.drones[name]), name=f"{name} as a vehicle")
             for one in self._at_broker:
                 tasks.create_task(one.run(), name="at the broker")
-
-    def hand_over(self, name: str, *, to_manager: bool) -> bool:
-        """As `Managers`."""
-        drone = self._drones.get(name)
-        if drone is None or not self._takes_orders:
-            return False
-        drone.taken_by_person(not to_manager)
-        return True
-
-    def flies(self, name: str) -> bool:
-        """As `Managers`."""
-        return self._takes_orders and name in self._drones and not self._drones[name].is_taken
-
-    def attach(self, wake: Callable[[], object] | None) -> None:
-        """No pictures are wanted here."""
-
-    def tell(self, drone: str, topic: str, value: Any) -> None:
-        """As `hub.Viewer`."""
-        if drone in self._drones:
-            self._drones[drone].tell(topic, value)
-
-    def show(self, key: PictureKey, picture: LinkPicture) -> None:
-        """No pictures are wanted here."""
-
-    def has_use_for(self, key: PictureKey) -> bool:  # noqa: ARG002 - as the protocol has it
-        """No pictures are wanted here."""
-        return False
-
-
-def _tell_page(hub: Hub, name: str, taken: bool) -> None:
-    hub.tell(name, "manager", {"flies": not taken})
 
 
 _QUIET: Final = logging.getLogger(f"{__name__}.client")

@@ -86,6 +86,13 @@ class PaperFleet:
             await asyncio.wait(tasks)
 
 
+async def on_way_to(node: str, fleet: PaperFleet) -> None:
+    """Drone b was asked for that, and is on the last leg there."""
+    b = fleet.drones["b"]
+    fleet.own.ask([node], "b")
+    await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == node, 100)
+
+
 def fly(
     go: Callable[[PaperFleet], Coroutine[Any, Any, None]], names: str = "abc", *, counts: bool = False
 ) -> PaperFleet:
@@ -119,8 +126,7 @@ def test_a_tour_is_split_among_the_drones_and_all_come_home() -> None:
 def test_a_named_drone_visits_what_it_is_asked_for_round_the_one_that_a_person_took() -> None:
     async def go(fleet: PaperFleet) -> None:
         a, b = fleet.drones["a"], fleet.drones["b"]
-        fleet.own.ask(["B3"], "b")
-        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        await on_way_to("B3", fleet)
         await b.act(Act("by-ann-1", CommandKind.PAUSE))
         fleet.own.ask(["A2"], "c")
         await until(lambda: not fleet.flown("b"))
@@ -156,8 +162,7 @@ def test_a_drone_that_holds_over_a_node_is_flown_on_when_it_is_given_back() -> N
 def test_who_is_silent_has_his_way_home_to_himself_until_he_is_heard() -> None:
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
-        fleet.own.ask(["B3"], "b")
-        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        await on_way_to("B3", fleet)
         b.heard = False
         fleet.own.ask(["B2"], "c")
         await until(lambda: not fleet.flown("b"))
@@ -219,8 +224,7 @@ def test_a_drone_whose_daemon_begins_anew_in_flight_keeps_its_air() -> None:
 def test_who_comes_down_without_a_place_is_not_put_back_on_its_pad(asked: str) -> None:
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
-        fleet.own.ask(["B3"], "b")
-        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        await on_way_to("B3", fleet)
         b.sees = False
         b.come_down()
         await until(lambda: not fleet.flown("b"))
@@ -234,8 +238,7 @@ def test_who_comes_down_without_a_place_is_not_put_back_on_its_pad(asked: str) -
 def test_a_pause_between_two_nodes_leaves_a_drone_to_traffic(monkeypatch: pytest.MonkeyPatch) -> None:
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
-        fleet.own.ask(["B3"], "b")
-        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        await on_way_to("B3", fleet)
         with monkeypatch.context() as patched:
             patched.setattr(TrafficControl, "paused", lambda _: frozenset({"b"}))
             await until(lambda: b.phase is Phase.HOLD)
@@ -266,8 +269,7 @@ def test_who_was_paused_as_traffic_failed_is_flown_on_by_the_new_one(monkeypatch
 def test_no_drone_is_sent_home_through_the_air_of_another_one() -> None:
     async def go(fleet: PaperFleet) -> None:
         a, b = fleet.drones["a"], fleet.drones["b"]
-        fleet.own.ask(["B4"], "b")
-        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B4", 100)
+        await on_way_to("B4", fleet)
         await b.act(Act("by-ann-1", CommandKind.PAUSE))
         await until(lambda: b.phase is Phase.HOLD)
         a.begin_anew()
