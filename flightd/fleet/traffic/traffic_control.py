@@ -148,6 +148,10 @@ class TrafficControl:
         reach_m = self._cell.separation_m + course.doubt_m
         return within(self.lanes, course.air, reach_m, self._cell.upright_m)
 
+    def closed_by(self) -> Mapping[str, frozenset[int]]:
+        """Into which air nobody else is released on account of each drone that is doubted, or roams."""
+        return self._zones()
+
     def paused(self) -> frozenset[str]:
         """The drones that must stand where they are: in doubt themselves, or released into a grown cell that
         they are not in yet."""

@@ -47,6 +47,8 @@ RULES: Mapping[str, Rule] = {
     "GET /": _ANYBODY,
     "GET /stock": _ANYBODY,
     "GET /stock/{rest:path}": _ANYBODY,
+    "GET /fleet": _ANYBODY,
+    "GET /fleet/{rest:path}": _ANYBODY,
     "GET /missions": _ANYBODY,
     "GET /missions/{rest:path}": _ANYBODY,
     "GET /flights": _ANYBODY,

@@ -18,7 +18,7 @@ from flightd.fleet.vda5050.order import Order
 from flightd.fleet.vehicle.signals import Decided
 from flightd.ground.fleet.base_orders import BaseOrders, instant, scan
 from flightd.ground.fleet.drone_air import DroneAir
-from flightd.ground.fleet.fleet_floor import FleetFloor
+from flightd.ground.fleet.fleet_floor import FleetFloor, OwnPad
 from flightd.ground.mqtt.managed_drone import ManagedDrone
 from flightd.ground.mqtt.order_flight import WAITS
 from flightd.mission.machine import FLYING
@@ -81,6 +81,11 @@ class FleetDrone:
         if self.air.is_astray or self.air.is_believed is False:
             return False
         return status.phase not in FLYING or status.phase is Phase.RELOCATE or self._is_on_base(status)
+
+    @property
+    def pad(self) -> OwnPad:
+        """Where it comes home to."""
+        return self._floor.pads[self.name]
 
     @property
     def why(self) -> str:

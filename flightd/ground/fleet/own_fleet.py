@@ -141,17 +141,17 @@ class OwnFleet(VehicleSides):
         return {"flies": self._traffic is not None, "trouble": self._trouble, **told}
 
 
-async def stop_all(hub: Hub) -> dict[str, str]:
+async def stop_all(hub: Hub) -> dict[str, FlightdError | None]:
     """STOP to every drone of the station; for each why not, or nothing."""
     drones = list(hub.drones.values())
     answers = await asyncio.gather(
         *(drone.act(_act(CommandKind.STOP)) for drone in drones), return_exceptions=True
     )
-    found: dict[str, str] = {}
+    found: dict[str, FlightdError | None] = {}
     for drone, answer in zip(drones, answers, strict=True):
         if isinstance(answer, BaseException) and not isinstance(answer, FlightdError):
             raise answer
-        found[drone.name] = str(answer).removeprefix("refused: ") if isinstance(answer, FlightdError) else ""
+        found[drone.name] = answer if isinstance(answer, FlightdError) else None
     return found
 
 

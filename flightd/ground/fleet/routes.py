@@ -10,13 +10,15 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.core.planned_flight import MOST_NODES
 from flightd.ground.access.access import Access
 from flightd.ground.access.gate import address_of, identity_of, note_act
 from flightd.ground.fleet.own_fleet import OwnFleet, stop_all
 from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, or_refused, said
+from flightd.ground.pages import page
+from flightd.ground.shown_text import shown
 
 _Name = Annotated[str, Meta(max_length=128)]
 
@@ -46,19 +48,26 @@ def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access) -> list[BaseR
         return as_json({})
 
     async def stop(request: Request) -> Response:
-        refused = await stop_all(hub)
-        for drone, why in refused.items():
+        refused: dict[str, str] = {}
+        again: list[str] = []
+        for drone, err in (await stop_all(hub)).items():
+            text = "" if err is None else str(err).removeprefix("refused: ")
             access.write_down(
                 identity_of(request),
                 address_of(request.scope),
                 "stop",
                 drone,
-                outcome="refused" if why else "accepted",
-                text=why,
+                outcome="accepted" if err is None else "refused",
+                text=text,
             )
-        return as_json({"refused": {drone: why for drone, why in refused.items() if why}})
+            if err is not None:
+                refused[drone] = shown(text)
+            if isinstance(err, UnavailableError | TransientError):
+                again.append(drone)
+        return as_json({"refused": refused, "again": again})
 
     return [
+        *page("/fleet"),
         Route("/api/fleet", or_refused(show), methods=["GET"]),
         Route("/api/fleet/tour", or_refused(ask), methods=["POST"]),
         Route("/api/fleet/stop", or_refused(stop), methods=["POST"]),

@@ -16,6 +16,7 @@ from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.traffic.work_queue import NodeWork, Value, WorkQueue
 from flightd.ground.fleet.fleet_drone import FLIGHT_S, RESERVE, FleetDrone
 from flightd.ground.fleet.fleet_floor import HEIGHT_M, FleetFloor
+from flightd.ground.fleet.traffic_view import TrafficView
 from flightd.ground.mqtt.safe_return import Standing
 from flightd.mission.plan.leg_times import Pace
 
@@ -46,6 +47,7 @@ class StationTraffic:
         self._dwell_ms = int(pace.dwell_s * 1000)
         self._flown: set[str] = set()
         self._airs: dict[str, tuple[int, frozenset[int], float]] = {}
+        self._view = TrafficView(self._control, self._queue, drones)
         for name in drones:
             self._control.enter(name, floor.pad(name))
 
@@ -79,6 +81,7 @@ class StationTraffic:
         for name in self._flown:
             paused = name in commands.paused - doubting  # who looks for his place stands by himself
             self._drones[name].fly(commands.base.get(name, ()), now_ms / 1000, paused=paused)
+        self._view.see(now_ms)
 
     def _lead_back(self, name: str, drone: FleetDrone, now_ms: int) -> None:
         """Keep others out of a drone's air until it rests, and then fly it again."""
@@ -97,20 +100,4 @@ class StationTraffic:
 
     def document(self) -> dict[str, Any]:
         """As JSON has it."""
-        lanes = self._control.lanes
-        return {
-            "drones": {
-                name: {
-                    "flown": name in self._flown,
-                    "at": lanes.vertices[course.place].node,
-                    "base": [lanes.vertices[action.vertex].node for action in course.base],
-                    "waits_for": list(self._control.waits(name)) if name in self._flown else [],
-                    "why": "" if name in self._flown else self._drones[name].why,
-                }
-                for name, course in self._control.drones.items()
-            },
-            "open": list(self._queue.open),
-            "given": dict(self._queue.given),
-            "done": list(self._queue.done),
-            "not_done": dict(self._queue.reasons),
-        }
+        return self._view.document(self.flown)

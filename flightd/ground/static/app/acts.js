@@ -2,7 +2,7 @@
 import { english } from "./language.js";
 import { isOver } from "./access/session.js";
 import { sendAct } from "./connection.js";
-import { shown, state, update } from "./store.js";
+import { state, update } from "./store.js";
 
 const AGAIN_MS = 500;
 const PATIENCE_MS = 6000;
@@ -11,11 +11,10 @@ const ANSWER_MS = 3000;
 const SOCKET_MS = 1000; // an act that was not answered over the socket by then goes by POST too
 
 // `plan`: the one that a start is for; the drone does not start where another one stands.
-export async function act(command, node = "", plan = "") {
-  const drone = state.selected;
+export async function act(command, node = "", plan = "", drone = state.selected) {
   if (!drone) return undefined;
   // What was seen as it was pressed: the drone refuses what was ordered by an old picture, or for another flight.
-  const { welcome, status } = shown();
+  const { welcome, status } = state.drones.get(drone) ?? {};
   const seen = { session: welcome?.session ?? "", seen_ns: status?.stamp_ns ?? 0 };
   const given = { id: newId(), command, ...(node && { node }), ...(plan && { plan }), ...seen };
   const began = performance.now();

@@ -30,6 +30,11 @@ export function hears() {
   return { good: true, short: trip ? say("Link {trip}", { trip }) : say("Heard"), text: "" };
 }
 
+// Whether a drone says nothing now: what is known of it is old.
+export function isSilent({ link, status, linkAt, heardAt }) {
+  return !state.socket.open || !link || !status || silentFor({ link, linkAt, heardAt }) > SILENT_S;
+}
+
 // The station tells twice a second how long ago it heard the drone; a status that came since is newer still.
 function silentFor({ link, linkAt, heardAt }) {
   const now = performance.now();

@@ -12,6 +12,12 @@ export const PAGES = [
     load: () => import("./live/live_page.js"),
   },
   {
+    path: "/fleet",
+    title: english("Fleet"),
+    styles: ["map.css", "missions.css", "fleet.css"],
+    load: () => import("./fleet/fleet_page.js"),
+  },
+  {
     path: "/stock",
     title: english("Stock"),
     styles: ["stock.css"],

@@ -25,6 +25,7 @@ export const state = {
   stock: null, // see stock/stock_state.js
   typedSettings: {}, // of each drone what was typed and not sent: {key: value}, see doctor/settings_view.js
   missions: null, // see missions/missions_state.js
+  fleet: null, // see fleet/fleet_state.js
   station: null, // version, drones, browsers
   drones: new Map(),
   selected: "", // drone that is shown and commanded

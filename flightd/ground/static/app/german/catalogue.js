@@ -3,6 +3,7 @@ import access from "./access.js";
 import autopilot from "./autopilot.js";
 import checks from "./checks.js";
 import doctor from "./doctor.js";
+import fleet from "./fleet.js";
 import flights from "./flights.js";
 import frame from "./frame.js";
 import guide from "./guide.js";
@@ -17,5 +18,5 @@ import studio from "./studio.js";
 export { readerOf } from "./reading.js";
 export const REPORTED = { ...autopilot, ...checks, ...refusals, ...reported };
 export const TEXTS = Object.assign(
-  Object.create(null), access, autopilot, checks, doctor, flights, frame, guide, live, missions, reported, refusals, site, stock, studio,
+  Object.create(null), access, autopilot, checks, doctor, fleet, flights, frame, guide, live, missions, reported, refusals, site, stock, studio,
 );

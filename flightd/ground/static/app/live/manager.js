@@ -22,7 +22,7 @@ export function Manager() {
 }
 
 // What became of it the station tells by its topic `manager`.
-async function handOver(drone, flies) {
+export async function handOver(drone, flies) {
   try {
     await askJson(`/drones/${encodeURIComponent(drone)}/manager`, {
       method: "POST",

@@ -1,6 +1,7 @@
 // Whole aisles and shelf levels at once, and in which order it is flown.
 import { html } from "../html.js";
 import { say } from "../language.js";
+import { aislesOf, Chip } from "../picks.js";
 import { choose, missions, toggleLevel, toggleNodes } from "./missions_state.js";
 
 export function ChooseCard({ floor }) {
@@ -36,18 +37,6 @@ export function ChooseCard({ floor }) {
       </div>
     </section>
   `;
-}
-
-function Chip({ on, part = false, onClick, children }) {
-  const kind = part && !on ? "pick part" : "pick";
-  return html`<button class=${kind} aria-pressed=${on} onClick=${onClick}>${children}</button>`;
-}
-
-function aislesOf({ nodes }) {
-  const found = new Map();
-  for (const { id, aisle } of nodes) found.set(aisle, [...(found.get(aisle) ?? []), id]);
-  found.delete("");
-  return [...found];
 }
 
 function levelsOf({ nodes }) {

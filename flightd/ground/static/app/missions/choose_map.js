@@ -1,9 +1,9 @@
 // The map to choose on: each node a button, numbered in the order in which it is flown.
 import { html, useMemo } from "../html.js";
 import { english, say } from "../language.js";
-import { nextInDirection } from "../live/map_keys.js";
 import { Drone, Legend, M, markScale } from "../live/map_marks.js";
 import { bounds, Floor } from "../live/site_plan.js";
+import { ToggledNodes } from "../live/toggled_nodes.js";
 import { shown } from "../store.js";
 import { missions, toggleNode } from "./missions_state.js";
 
@@ -57,34 +57,9 @@ function Numbers({ nodes, order, scale }) {
 // The order is told by the drone's plan; before it is known, the nodes are only marked.
 function Nodes({ floor, order, scale }) {
   const { nodes: chosen } = missions();
-  const entry = chosen[0] ?? floor.home;
-  const onKey = (event, node) => {
-    const next = nextInDirection(floor.nodes, node, event.key);
-    if (next) document.getElementById(`choose-${next.id}`)?.focus();
-    else if (event.key === "Enter" || event.key === " ") toggleNode(node.id);
-    else return;
-    event.preventDefault();
+  const name = (node, isChosen) => {
+    const place = order ? order.indexOf(node) + 1 : 0;
+    return say(isChosen && place ? english("Node {node}, flown as number {place}") : english("Node {node}"), { node, place });
   };
-  return floor.nodes.map((node) => {
-    const isChosen = chosen.includes(node.id);
-    const place = order ? order.indexOf(node.id) + 1 : 0;
-    const words = say(isChosen && place ? english("Node {node}, flown as number {place}") : english("Node {node}"), { node: node.id, place });
-    return html`
-      <g
-        key=${node.id}
-        id=${`choose-${node.id}`}
-        class=${isChosen ? "node picked" : "node"}
-        transform=${`translate(${node.x_m * M} ${node.y_m * M}) scale(${scale})`}
-        role="button"
-        aria-pressed=${isChosen}
-        aria-label=${words}
-        tabindex=${node.id === entry ? 0 : -1}
-        onClick=${() => toggleNode(node.id)}
-        onKeyDown=${(event) => onKey(event, node)}
-      >
-        <circle class="touch" r="32" /><circle class="mark" r=${isChosen ? 17 : 9} />
-        <text x="14" y="36">${node.id}</text>
-      </g>
-    `;
-  });
+  return html`<${ToggledNodes} floor=${floor} chosen=${chosen} entry=${chosen[0] ?? floor.home} onToggle=${toggleNode} scale=${scale} name=${name} />`;
 }

@@ -1,0 +1,39 @@
+// What the page Fleet knows beside what the drones tell: the station's traffic, what is chosen for a tour, the
+// calendar, and STOP for all.
+import { state, update } from "../store.js";
+
+const EMPTY = {
+  told: null, // as GET /api/fleet; null: not known, or the station flies no fleet
+  none: false, // the station flies no fleet
+  trouble: "", // why it is not known
+  hall: "", // name of the site that is shown, as it was chosen; empty: the first drone's
+  chosen: [], // ids of nodes for a tour
+  by: "", // the drone for it; empty: whichever
+  asked: null, // what became of the newest tour: {count} or {refused}
+  calendar: null, // {kept, from, runs}
+  calendarFrom: "", // first day that is shown, as 2026-11-26
+  calendarTrouble: "",
+  stop: null, // STOP for all: {stage: "armed", "sent" or "told", at, outcomes: {drone: "" or why not}}
+};
+
+export const fleet = () => state.fleet ?? EMPTY;
+
+export function change(changes) {
+  update((s) => {
+    s.fleet = { ...(s.fleet ?? EMPTY), ...changes };
+  });
+}
+
+export const choose = (chosen) => change({ chosen, asked: null });
+
+export function toggleNode(id) {
+  const { chosen } = fleet();
+  choose(chosen.includes(id) ? chosen.filter((other) => other !== id) : [...chosen, id]);
+}
+
+// All of these nodes, or none of them where all are chosen already.
+export function toggleNodes(ids) {
+  const { chosen } = fleet();
+  const all = ids.every((id) => chosen.includes(id));
+  choose(all ? chosen.filter((id) => !ids.includes(id)) : [...chosen, ...ids.filter((id) => !chosen.includes(id))]);
+}
