@@ -54,7 +54,6 @@ SOURCES = (
 """Where a page's texts come from."""
 NO_PAGE = {
     "ground/drone_names.py": "options of the command line",
-    "ground/fleet": "for programs, and the station's log",
     "ground/foxglove_view": "options of the command line, and Foxglove's own connection",
     "ground/access/key_book.py": "of the command line",
     "ground/ground_store": "of the command line, of programs that deliver, and of the station's start",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -27,9 +28,14 @@ from flightd.site.site_file import load_site
 from tests.web.live_flight import LiveFlight
 
 ROOT = Path(__file__).parents[2]
-MOST_BYTES = 300_000
-"""Of all pages together, compressed: one is on the screen within a second on any link that can carry its
-pictures."""
+MOST_BYTES = 315_000
+"""Of all pages together, compressed.  Each is fetched when it is first shown, and so is German for who reads
+it: see `MOST_OF_PAGE`."""
+MOST_OF_PAGE = 200_000
+"""Of all that one page needs in German, compressed: it is on the screen within a second on any link that can
+carry its pictures."""
+IMPORTED = re.compile(r'(?:\bfrom|\bimport)\s*\(?"(\.[^"]+)"')
+PAGE = re.compile(r'styles: \[(?P<styles>[^]]*)\],\s*load: \(\) => import\("(?P<module>[^"]+)"\)')
 
 
 @pytest.fixture(autouse=True)
@@ -229,7 +235,19 @@ def test_beyond_this_machine_addresses_and_the_certificates_names_may_stand_in_a
 def test_the_page_is_small_whole_and_names_no_foreign_host() -> None:
     files = [path for path in STATIC.rglob("*") if path.is_file()]
     shipped = [path for path in files if not path.name.endswith(".LICENSE.txt")]
-    assert sum(len(gzip.compress(path.read_bytes())) for path in shipped) < MOST_BYTES
+    packed = {path: len(gzip.compress(path.read_bytes())) for path in shipped}
+    assert sum(packed.values()) < MOST_BYTES
+    app = STATIC / "app"
+    frame = {
+        *_needed(app / "main.js"),
+        STATIC / "index.html",
+        STATIC / "style" / "base.css",
+        STATIC / "style" / "frame.css",
+    }
+    for page in PAGE.finditer((app / "pages.js").read_text()):
+        styles = {(STATIC / "style" / name).resolve() for name in re.findall('"([^"]+)"', page["styles"])}
+        needed = frame | styles | _needed((app / page["module"]).resolve())
+        assert sum(packed[path] for path in needed) < MOST_OF_PAGE, page["module"]
     own = [path for path in shipped if "vendor" not in path.parts]
     for path in own:
         text = path.read_text().replace("http://www.w3.org/2000/svg", "")
@@ -240,3 +258,13 @@ def test_the_page_is_small_whole_and_names_no_foreign_host() -> None:
         "preact.LICENSE.txt",
         "uplot.LICENSE.txt",
     }
+
+
+def _needed(module: Path) -> set[Path]:
+    """A module of the pages with all that it imports, the other pages left out."""
+    found, todo = set[Path](), [module]
+    while todo:
+        found.add(path := todo.pop())
+        asked = [] if path.name == "pages.js" else IMPORTED.findall(path.read_text())
+        todo += {(path.parent / one).resolve() for one in asked} - found
+    return found

@@ -121,6 +121,17 @@ class Rule:
             day = self.next_day(day + _DAY)
         return found
 
+    def of_days(self, first: date, days: int) -> Iterator[Occurrence]:
+        """Those of so many local days from `first` on."""
+        for day in (first + ahead * _DAY for ahead in range(days)):
+            if self.is_on(day):
+                at = instant_of(day, self.at, self._zone)
+                yield Occurrence(day, at, self._until(day, at))
+
+    def clock(self, at: datetime) -> datetime:
+        """What the clocks of its zone show then: later than its own time where they skip that."""
+        return at.astimezone(self._zone).replace(tzinfo=None)
+
     def _until(self, day: date, at: datetime) -> datetime:
         """The end of a run's window: the next run takes its place."""
         for ahead in range(1, self.window.days + 3):

@@ -93,6 +93,7 @@ RULES: Mapping[str, Rule] = {
     "PUT /api/missions/{mission}": _ACTS,
     "DELETE /api/missions/{mission}": _ACTS,
     "GET /api/schedules": _LOOKS,
+    "GET /api/schedules/calendar": _LOOKS,
     "GET /api/schedules/{schedule}/runs": _LOOKS,
     "PUT /api/schedules/{schedule}": _ACTS,
     "DELETE /api/schedules/{schedule}": _ACTS,

@@ -99,6 +99,8 @@ class FleetDrone:
             return "nothing shows that it stands on its pad; give it back once it does"
         if self.drone.is_taken or self.air.is_believed is False:
             return "a person has it" if self.drone.is_taken else "it was started anew in flight"
+        if status.phase is Phase.DONE and self.air.rests:
+            return "its flight is over: it flies the next one once its flightd was started anew"
         if not self.drone.is_automatic:
             return f"it takes no orders now: {status.phase}, {status.reason}".removesuffix(", ")
         return self._refused or "it is not where traffic could fly it on from"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from flightd.ground.access.gate import note_act
 from flightd.ground.bounded import Threads
 from flightd.ground.json_http import AnswerTo, as_json, or_refused, said
 from flightd.ground.schedules.kept import Kept, Schedule
+from flightd.ground.schedules.run_calendar import calendar_of, read_days
 from flightd.ground.schedules.schedule_book import Run, ScheduleBook
 
 _AT_ONCE, _MOST_WAITING = 1, 32
@@ -29,6 +30,7 @@ def schedule_routes(folder: Path | None, utc_ns: Callable[[], int]) -> list[Base
     desk = _Desk(None if folder is None else ScheduleBook(folder), utc_ns)
     ways: list[tuple[str, str, AnswerTo]] = [
         ("", "GET", desk.listed),
+        ("/calendar", "GET", desk.calendar),
         ("/{schedule}", "PUT", desk.keep),
         ("/{schedule}", "DELETE", desk.delete),
         ("/{schedule}/runs", "GET", desk.runs),
@@ -72,6 +74,25 @@ class _Desk:
         """What became of a schedule's runs, newest first."""
         runs = await self._threads.run(self._kept_in().runs, request.path_params["schedule"])
         return as_json({"runs": [told_run(run) for run in runs]})
+
+    async def calendar(self, request: Request) -> Response:
+        """The runs of all schedules of `?days=N` days `from=DAY`, each by its own schedule's clocks."""
+        first, days = read_days(request.query_params.get("from", ""), request.query_params.get("days", "7"))
+        if self._book is None:
+            return as_json({"kept": False, "from": first, "days": days, "runs": [], "troubles": []})
+        runs, troubles = await self._threads.run(self._calendar, first, days)
+        return as_json({"kept": True, "from": first, "days": days, "runs": runs, "troubles": troubles})
+
+    def _calendar(self, first: date, days: int) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+        book, now = self._kept_in(), self._now()
+        runs: list[dict[str, Any]] = []
+        troubles: list[dict[str, str]] = []
+        for schedule in book.schedules():
+            try:
+                runs += calendar_of(schedule, book.runs(schedule.id, since=first), first, days, now)
+            except FlightdError as err:
+                troubles.append({"name": schedule.kept.name, "why": str(err)})
+        return runs, troubles
 
     def _told(self, site: str) -> list[dict[str, Any]]:
         book, now = self._kept_in(), self._now()

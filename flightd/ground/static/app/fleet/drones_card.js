@@ -38,7 +38,7 @@ function Row({ name, mark, told, hall }) {
       </div>
       <div class="fleet-acts">
         <a class="order" href="/" aria-label=${say("{name} on Live", { name })} onClick=${() => selectDrone(name)}>${say("Live")}</a>
-        ${manager && !manager.flies && mayOperate() && html`<button class="order" aria-label=${say("Give {name} to the fleet", { name })} onClick=${() => handOver(name, true)}>${say("Give it to the fleet")}</button>`}
+        ${manager && !manager.flies && mayOperate() && html`<button class="order" aria-label=${say("Give it to the fleet: {name}", { name })} onClick=${() => handOver(name, true)}>${say("Give it to the fleet")}</button>`}
       </div>
     </li>
   `;

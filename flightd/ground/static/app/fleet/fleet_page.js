@@ -3,13 +3,15 @@ import { mayOperate } from "../access/session.js";
 import { html, useEffect } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
 import { state } from "../store.js";
+import { CalendarCard } from "./calendar_card.js";
 import { marksOf } from "./drone_badge.js";
 import { DronesCard } from "./drones_card.js";
-import { loadFleet } from "./fleet_source.js";
-import { change, fleet } from "./fleet_state.js";
+import { change, fleet, loadFleet } from "./fleet_state.js";
 import { HallMap } from "./hall_map.js";
 import { StopAll } from "./stop_all.js";
+import { Timeline } from "./timeline.js";
 import { heardOf } from "./whereabouts.js";
+import { WorkCard } from "./work_card.js";
 
 const AGAIN_MS = 1000;
 const RARELY_MS = 10000; // a station that flies no fleet does not begin to
@@ -31,10 +33,13 @@ export default function FleetPage() {
         <h2 class="missions-title">${say("Fleet")} <small>${say("{n} drone|{n} drones", { n: names.length })}</small></h2>
         ${halls.length > 1 && html`<${Halls} halls=${halls} hall=${hall} />`}
         ${here.length > 0 ? html`<${HallMap} key=${hall} drones=${here} marks=${marks} told=${told} mayChoose=${mayAsk} />` : html`<${NoMap} names=${names} />`}
+        ${told?.drones && html`<${Timeline} told=${told} marks=${marks} />`}
+        <${CalendarCard} />
       </div>
       <div class="missions-side">
         <${Traffic} told=${told} none=${none} trouble=${trouble} />
         ${names.length > 0 && html`<${DronesCard} marks=${marks} told=${told} hall=${hall} />`}
+        ${told?.flies && here.length > 0 && html`<${WorkCard} told=${told} marks=${marks} floor=${here[0].floor} />`}
       </div>
     </div>
   `;

@@ -1,5 +1,7 @@
-// What the page Fleet knows beside what the drones tell: the station's traffic, what is chosen for a tour, the
-// calendar, and STOP for all.
+// What the page Fleet knows beside what the drones tell: the station's traffic, what is chosen for a tour and asked
+// for, the calendar, and STOP for all.
+import { askJson, askStation, isGivenUp } from "../fetching.js";
+import { english } from "../language.js";
 import { state, update } from "../store.js";
 
 const EMPTY = {
@@ -36,4 +38,32 @@ export function toggleNodes(ids) {
   const { chosen } = fleet();
   const all = ids.every((id) => chosen.includes(id));
   choose(all ? chosen.filter((id) => !ids.includes(id)) : [...chosen, ...ids.filter((id) => !chosen.includes(id))]);
+}
+
+const NO_FLEET = 404;
+
+export async function loadFleet() {
+  try {
+    const answer = await askStation("/api/fleet");
+    if (answer.status === NO_FLEET) return change({ told: null, none: true, trouble: "" });
+    const told = await answer.json();
+    if (!answer.ok) throw new Error(told.refused ?? english("the ground station answers {status}", { status: answer.status }));
+    return change({ told, none: false, trouble: "" });
+  } catch (error) {
+    if (!isGivenUp(error)) change({ trouble: error.message });
+    return undefined;
+  }
+}
+
+export async function askTour() {
+  const { chosen: nodes, by: drone } = fleet();
+  try {
+    await askJson("/api/fleet/tour", {
+      method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ nodes, drone }), goesOn: true,
+    });
+    change({ chosen: [], asked: { count: nodes.length } });
+  } catch (error) {
+    change({ asked: { refused: error.message } });
+  }
+  loadFleet();
 }
