@@ -9,7 +9,7 @@
 */
 const FEAT_TIME = true;
 const pre = "u-";
-const UPLOT =       "uplot";
+const UPLOT = "uplot";
 const ORI_HZ = pre + "hz";
 const ORI_VT = pre + "vt";
 const TITLE = pre + "title";
@@ -49,8 +49,8 @@ const change = "change";
 const dppxchange = "dppxchange";
 const LEGEND_DISP = "--";
 const domEnv = typeof window != 'undefined';
-const doc = domEnv ? document  : null;
-const win = domEnv ? window    : null;
+const doc = domEnv ? document : null;
+const win = domEnv ? window : null;
 const nav = domEnv ? navigator : null;
 let pxRatio;
 let query;
@@ -251,7 +251,7 @@ mode: 3,
 pad: rangePad,
 };
 const _eqRangePart = {
-pad:  0,
+pad: 0,
 soft: null,
 mode: 0,
 };
@@ -262,7 +262,7 @@ max: _eqRangePart,
 function rangeNum(_min, _max, mult, extra) {
 if (isObj(mult))
 return _rangeNum(_min, _max, mult);
-_eqRangePart.pad  = mult;
+_eqRangePart.pad = mult;
 _eqRangePart.soft = extra ? 0 : null;
 _eqRangePart.mode = extra ? 3 : 0;
 return _rangeNum(_min, _max, _eqRange);
@@ -286,8 +286,8 @@ let cmax = cfg.max;
 let padMin = ifNull(cmin.pad, 0);
 let padMax = ifNull(cmax.pad, 0);
 let hardMin = ifNull(cmin.hard, -inf);
-let hardMax = ifNull(cmax.hard,  inf);
-let softMin = ifNull(cmin.soft,  inf);
+let hardMax = ifNull(cmax.hard, inf);
+let softMin = ifNull(cmin.soft, inf);
 let softMax = ifNull(cmax.soft, -inf);
 let softMinMode = ifNull(cmin.mode, 0);
 let softMaxMode = ifNull(cmax.mode, 0);
@@ -335,7 +335,7 @@ const pow = M.pow;
 const sign = M.sign;
 const log10 = M.log10;
 const log2 = M.log2;
-const sinh =  (v, linthresh = 1) => M.sinh(v) * linthresh;
+const sinh = (v, linthresh = 1) => M.sinh(v) * linthresh;
 const asinh = (v, linthresh = 1) => M.asinh(v / linthresh);
 const inf = Infinity;
 function numIntDigits(x) {
@@ -621,9 +621,9 @@ const days3 = days.map(slice3);
 const months3 = months.map(slice3);
 const engNames = {
 MMMM: months,
-MMM:  months3,
+MMM: months3,
 WWWW: days,
-WWW:  days3,
+WWW: days3,
 };
 function zeroPad2(int) {
 return (int < 10 ? '0' : '') + int;
@@ -632,27 +632,27 @@ function zeroPad3(int) {
 return (int < 10 ? '00' : int < 100 ? '0' : '') + int;
 }
 const subs = {
-YYYY:	d => d.getFullYear(),
-YY:		d => (d.getFullYear()+'').slice(2),
-MMMM:	(d, names) => names.MMMM[d.getMonth()],
-MMM:	(d, names) => names.MMM[d.getMonth()],
-MM:		d => zeroPad2(d.getMonth()+1),
-M:		d => d.getMonth()+1,
-DD:		d => zeroPad2(d.getDate()),
-D:		d => d.getDate(),
-WWWW:	(d, names) => names.WWWW[d.getDay()],
-WWW:	(d, names) => names.WWW[d.getDay()],
-HH:		d => zeroPad2(d.getHours()),
-H:		d => d.getHours(),
-h:		d => {let h = d.getHours(); return h == 0 ? 12 : h > 12 ? h - 12 : h;},
-AA:		d => d.getHours() >= 12 ? 'PM' : 'AM',
-aa:		d => d.getHours() >= 12 ? 'pm' : 'am',
-a:		d => d.getHours() >= 12 ? 'p' : 'a',
-mm:		d => zeroPad2(d.getMinutes()),
-m:		d => d.getMinutes(),
-ss:		d => zeroPad2(d.getSeconds()),
-s:		d => d.getSeconds(),
-fff:	d => zeroPad3(d.getMilliseconds()),
+YYYY: d => d.getFullYear(),
+YY: d => (d.getFullYear()+'').slice(2),
+MMMM: (d, names) => names.MMMM[d.getMonth()],
+MMM: (d, names) => names.MMM[d.getMonth()],
+MM: d => zeroPad2(d.getMonth()+1),
+M: d => d.getMonth()+1,
+DD: d => zeroPad2(d.getDate()),
+D: d => d.getDate(),
+WWWW: (d, names) => names.WWWW[d.getDay()],
+WWW: (d, names) => names.WWW[d.getDay()],
+HH: d => zeroPad2(d.getHours()),
+H: d => d.getHours(),
+h: d => {let h = d.getHours(); return h == 0 ? 12 : h > 12 ? h - 12 : h;},
+AA: d => d.getHours() >= 12 ? 'PM' : 'AM',
+aa: d => d.getHours() >= 12 ? 'pm' : 'am',
+a: d => d.getHours() >= 12 ? 'p' : 'a',
+mm: d => zeroPad2(d.getMinutes()),
+m: d => d.getMinutes(),
+ss: d => zeroPad2(d.getSeconds()),
+s: d => d.getSeconds(),
+fff: d => zeroPad3(d.getMilliseconds()),
 };
 function fmtDate(tpl, names) {
 names = names || engNames;
@@ -699,12 +699,12 @@ const NLhmmaa = NL + hmmaa;
 const ss = ":{ss}";
 const _ = null;
 function genTimeStuffs(ms) {
-let	s  = ms * 1e3,
-m  = s  * 60,
-h  = m  * 60,
-d  = h  * 24,
-mo = d  * 30,
-y  = d  * 365;
+let s = ms * 1e3,
+m = s * 60,
+h = m * 60,
+d = h * 24,
+mo = d * 30,
+y = d * 365;
 let subSecIncrs = ms == 1 ? genIncrs(10, 0, 3, allMults).filter(onlyWhole) : genIncrs(10, -3, 0, allMults);
 let timeIncrs = subSecIncrs.concat([
 s,
@@ -749,11 +749,11 @@ y * 50,
 y * 100,
 ]);
 const _timeAxisStamps = [
-[y,           yyyy,            _,                      _,      _,                    _,      _,        _,       1],
-[d * 28,      "{MMM}",         NLyyyy,                 _,      _,                    _,      _,        _,       1],
-[d,           md,              NLyyyy,                 _,      _,                    _,      _,        _,       1],
-[h,           "{h}" + aa,      NLmdyy,                 _,      NLmd,                 _,      _,        _,       1],
-[m,           hmmaa,           NLmdyy,                 _,      NLmd,                 _,      _,        _,       1],
+[y, yyyy, _, _, _, _, _, _, 1],
+[d * 28, "{MMM}", NLyyyy, _, _, _, _, _, 1],
+[d, md, NLyyyy, _, _, _, _, _, 1],
+[h, "{h}" + aa, NLmdyy, _, NLmd, _, _, _, 1],
+[m, hmmaa, NLmdyy, _, NLmd, _, _, _, 1],
 [s,           ss,              NLmdyy + " " + hmmaa,   _,      NLmd + " " + hmmaa,   _,      NLhmmaa,  _,       1],
 [ms,          ss + ".{fff}",   NLmdyy + " " + hmmaa,   _,      NLmd + " " + hmmaa,   _,      NLhmmaa,  _,       1],
 ];
@@ -768,7 +768,7 @@ let minMin = mkDate(minDate.getFullYear(), isYr ? 0 : minDate.getMonth(), isMo |
 let minMinTs = roundDec(minMin * ms, 3);
 if (isMo || isYr) {
 let moIncr = isMo ? foundIncr / mo : 0;
-let yrIncr = isYr ? foundIncr / y  : 0;
+let yrIncr = isYr ? foundIncr / y : 0;
 let split = minDateTs == minMinTs ? minDateTs : roundDec(mkDate(minMin.getFullYear() + yrIncr, minMin.getMonth() + moIncr, 1) * ms, 3);
 let splitDate = new Date(round(split / ms));
 let baseYear = splitDate.getFullYear();
@@ -823,7 +823,7 @@ timeAxisSplits,
 ];
 }
 const [ timeIncrsMs, _timeAxisStampsMs, timeAxisSplitsMs ] = genTimeStuffs(1);
-const [ timeIncrsS,  _timeAxisStampsS,  timeAxisSplitsS  ] = genTimeStuffs(1e-3);
+const [ timeIncrsS, _timeAxisStampsS, timeAxisSplitsS ] = genTimeStuffs(1e-3);
 genIncrs(2, -53, 53, [1]);
 function timeAxisStamps(stampCfg, fmtDate) {
 return stampCfg.map(s => s.map((v, i) =>
@@ -951,21 +951,21 @@ y: true,
 lock: false,
 move: cursorMove,
 points: {
-one:    false,
-show:   cursorPointShow,
-size:   cursorPointSize,
-width:  0,
+one: false,
+show: cursorPointShow,
+size: cursorPointSize,
+width: 0,
 stroke: cursorPointStroke,
-fill:   cursorPointFill,
+fill: cursorPointFill,
 },
 bind: {
-mousedown:   filtBtn0,
-mouseup:     filtBtn0,
-click:       filtBtn0,
-dblclick:    filtBtn0,
-mousemove:   filtTarg,
-mouseleave:  filtTarg,
-mouseenter:  filtTarg,
+mousedown: filtBtn0,
+mouseup: filtBtn0,
+click: filtBtn0,
+dblclick: filtBtn0,
+mousemove: filtTarg,
+mouseleave: filtTarg,
+mouseenter: filtTarg,
 },
 drag: {
 setScale: true,
@@ -1315,8 +1315,8 @@ return [
 fillDir,
 (
 clipDirs == 1 ? -1 :
-clipDirs == 2 ?  1 :
-clipDirs == 3 ?  2 :
+clipDirs == 2 ? 1 :
+clipDirs == 3 ? 2 :
 0
 )
 ];
@@ -1328,8 +1328,8 @@ let scaleKey = mode == 2 ? series.facets[1].scale : series.scale;
 let scale = self.scales[scaleKey];
 return (
 bandFillDir == -1 ? scale.min :
-bandFillDir ==  1 ? scale.max :
-scale.distr ==  3 ? (
+bandFillDir == 1 ? scale.max :
+scale.distr == 3 ? (
 scale.dir == 1 ? scale.min :
 scale.max
 ) : 0
@@ -1433,7 +1433,7 @@ return (p, x, y, w, h, endRad = 0, baseRad = 0) => {
 if (endRad == 0 && baseRad == 0)
 rect(p, x, y, w, h);
 else {
-endRad  = min(endRad,  w / 2, h / 2);
+endRad = min(endRad, w / 2, h / 2);
 baseRad = min(baseRad, w / 2, h / 2);
 moveTo(p, x + endRad, y);
 arcTo(p, x + w, y, x + w, y + h, endRad);
@@ -1549,7 +1549,7 @@ let nextAccXVal = xForPixel(dir == 1 ? idx0px + 1 : idx1px - 1);
 for (let i = dir == 1 ? idx0 : idx1; i >= idx0 && i <= idx1; i += dir) {
 let xVal = dataX[i];
 let reuseAccX = dir == 1 ? (xVal < nextAccXVal) : (xVal > nextAccXVal);
-let x = reuseAccX ? accX :  pixelForX(xVal);
+let x = reuseAccX ? accX : pixelForX(xVal);
 let yVal = dataY[i];
 if (x == accX) {
 if (yVal != null) {
@@ -1619,7 +1619,7 @@ _paths.clip = clipGaps(gaps, scaleX.ori, xOff, yOff, xDim, yDim);
 if (bandClipDir != 0) {
 _paths.band = bandClipDir == 2 ? [
 clipBandLine(u, seriesIdx, idx0, idx1, stroke, -1),
-clipBandLine(u, seriesIdx, idx0, idx1, stroke,  1),
+clipBandLine(u, seriesIdx, idx0, idx1, stroke, 1),
 ] : clipBandLine(u, seriesIdx, idx0, idx1, stroke, bandClipDir);
 }
 return _paths;
@@ -1682,8 +1682,8 @@ if (!series.spanGaps) {
 let gaps = [];
 gaps.push(...findGaps(dataX, dataY, idx0, idx1, dir, pixelForX, alignGaps));
 let halfStroke = (series.width * pxRatio) / 2;
-let startsOffset = (ascDesc || align ==  1) ?  halfStroke : -halfStroke;
-let endsOffset = (ascDesc || align == -1) ? -halfStroke :  halfStroke;
+let startsOffset = (ascDesc || align == 1) ? halfStroke : -halfStroke;
+let endsOffset = (ascDesc || align == -1) ? -halfStroke : halfStroke;
 gaps.forEach(g => {
 g[0] += startsOffset;
 g[1] += endsOffset;
@@ -1694,7 +1694,7 @@ _paths.clip = clipGaps(gaps, scaleX.ori, xOff, yOff, xDim, yDim);
 if (bandClipDir != 0) {
 _paths.band = bandClipDir == 2 ? [
 clipBandLine(u, seriesIdx, idx0, idx1, stroke, -1),
-clipBandLine(u, seriesIdx, idx0, idx1, stroke,  1),
+clipBandLine(u, seriesIdx, idx0, idx1, stroke, 1),
 ] : clipBandLine(u, seriesIdx, idx0, idx1, stroke, bandClipDir);
 }
 return _paths;
@@ -1854,7 +1854,7 @@ rect(fillPaths.get(fillColors[i]), lft, top + floor(strokeWidth / 2), barWid, ma
 else
 rect(stroke, lft, top + floor(strokeWidth / 2), barWid, max(0, barHgt - strokeWidth), rv, rb);
 each(u, seriesIdx, i,
-lft    - strokeWidth / 2,
+lft - strokeWidth / 2,
 top,
 barWid + strokeWidth,
 barHgt,
@@ -1924,7 +1924,7 @@ _paths.clip = clipGaps(gaps, scaleX.ori, xOff, yOff, xDim, yDim);
 if (bandClipDir != 0) {
 _paths.band = bandClipDir == 2 ? [
 clipBandLine(u, seriesIdx, idx0, idx1, stroke, -1),
-clipBandLine(u, seriesIdx, idx0, idx1, stroke,  1),
+clipBandLine(u, seriesIdx, idx0, idx1, stroke, 1),
 ] : clipBandLine(u, seriesIdx, idx0, idx1, stroke, bandClipDir);
 }
 return _paths;
@@ -1944,13 +1944,13 @@ if (n == 2)
 lineTo(path, xs[1], ys[1]);
 else {
 let ms = Array(n),
-ds  = Array(n - 1),
+ds = Array(n - 1),
 dys = Array(n - 1),
 dxs = Array(n - 1);
 for (let i = 0; i < n - 1; i++) {
 dys[i] = ys[i + 1] - ys[i];
 dxs[i] = xs[i + 1] - xs[i];
-ds[i]  = dys[i] / dxs[i];
+ds[i] = dys[i] / dxs[i];
 }
 ms[0] = ds[0];
 for (let i = 1; i < n - 1; i++) {
@@ -2094,9 +2094,9 @@ const ms = opts.ms || 1e-3;
 const series = self.series = mode == 1 ?
 setDefaults(opts.series || [], xSeriesOpts, ySeriesOpts, false) :
 setDefaults2(opts.series || [null], xySeriesOpts);
-const axes = self.axes   = setDefaults(opts.axes   || [], xAxisOpts,   yAxisOpts,    true);
+const axes = self.axes = setDefaults(opts.axes || [], xAxisOpts, yAxisOpts, true);
 const scales = self.scales = {};
-const bands = self.bands  = opts.bands || [];
+const bands = self.bands = opts.bands || [];
 bands.forEach(b => {
 b.fill = fnOrSelf(b.fill || null);
 b.dir = ifNull(b.dir, -1);
@@ -2109,8 +2109,8 @@ series: drawSeries,
 const drawOrder = (opts.drawOrder || ["axes", "series"]).map(key => drawOrderMap[key]);
 function initValToPct(sc) {
 const getVal = (
-sc.distr == 3   ? val => log10(val > 0 ? val : sc.clamp(self, val, sc.min, sc.max, sc.key)) :
-sc.distr == 4   ? val => asinh(val, sc.asinh) :
+sc.distr == 3 ? val => log10(val > 0 ? val : sc.clamp(self, val, sc.min, sc.max, sc.key)) :
+sc.distr == 4 ? val => asinh(val, sc.asinh) :
 sc.distr == 100 ? val => sc.fwd(val) :
 val => val
 );
@@ -2209,16 +2209,16 @@ const _timeAxisVals = timeAxisVals(_tzDate, timeAxisStamps((ms == 1 ? _timeAxisS
 const _timeSeriesVal = timeSeriesVal(_tzDate, timeSeriesStamp(_timeSeriesStamp, _fmtDate));
 const activeIdxs = [];
 const legend = (self.legend = assign({}, legendOpts, opts.legend));
-const cursor =                (self.cursor = assign({}, cursorOpts, {drag: {y: mode == 2}}, opts.cursor));
+const cursor = (self.cursor = assign({}, cursorOpts, {drag: {y: mode == 2}}, opts.cursor));
 const showLegend = legend.show;
-const showCursor =                cursor.show;
+const showCursor = cursor.show;
 const markers = legend.markers;
 {
 legend.idxs = activeIdxs;
-markers.width  = fnOrSelf(markers.width);
-markers.dash   = fnOrSelf(markers.dash);
+markers.width = fnOrSelf(markers.width);
+markers.dash = fnOrSelf(markers.dash);
 markers.stroke = fnOrSelf(markers.stroke);
-markers.fill   = fnOrSelf(markers.fill);
+markers.fill = fnOrSelf(markers.fill);
 }
 let legendTable;
 let legendHead;
@@ -2359,15 +2359,15 @@ shouldSetSize = true;
 commit();
 }
 function calcSize(width, height) {
-self.width  = fullWidCss = plotWidCss = width;
+self.width = fullWidCss = plotWidCss = width;
 self.height = fullHgtCss = plotHgtCss = height;
-plotLftCss  = plotTopCss = 0;
+plotLftCss = plotTopCss = 0;
 calcPlotRect();
 calcAxesRects();
 let bb = self.bbox;
-plotLft = bb.left   = incrRound(plotLftCss * pxRatio, 0.5);
-plotTop = bb.top    = incrRound(plotTopCss * pxRatio, 0.5);
-plotWid = bb.width  = incrRound(plotWidCss * pxRatio, 0.5);
+plotLft = bb.left = incrRound(plotLftCss * pxRatio, 0.5);
+plotTop = bb.top = incrRound(plotTopCss * pxRatio, 0.5);
+plotWid = bb.width = incrRound(plotWidCss * pxRatio, 0.5);
 plotHgt = bb.height = incrRound(plotHgtCss * pxRatio, 0.5);
 }
 const CYCLE_LIMIT = 3;
@@ -2491,7 +2491,7 @@ nonNullRgt = j;
 if (nonNullLft != null || nonNullRgt != null) {
 if (withProx) {
 let lftPos = nonNullLft == null ? -Infinity : valToPosX(xValues[nonNullLft], scaleX, xDim, 0);
-let rgtPos = nonNullRgt == null ?  Infinity : valToPosX(xValues[nonNullRgt], scaleX, xDim, 0);
+let rgtPos = nonNullRgt == null ? Infinity : valToPosX(xValues[nonNullRgt], scaleX, xDim, 0);
 let lftDelta = cursorLft - lftPos;
 let rgtDelta = rgtPos - cursorLft;
 if (lftDelta <= rgtDelta) {
@@ -2522,11 +2522,11 @@ const setCursorEvent = e => { cursor.event = e; };
 cursor.idxs = activeIdxs;
 cursor._lock = false;
 let points = cursor.points;
-points.show   = fnOrSelf(points.show);
-points.size   = fnOrSelf(points.size);
+points.show = fnOrSelf(points.show);
+points.size = fnOrSelf(points.size);
 points.stroke = fnOrSelf(points.stroke);
-points.width  = fnOrSelf(points.width);
-points.fill   = fnOrSelf(points.fill);
+points.width = fnOrSelf(points.width);
+points.fill = fnOrSelf(points.fill);
 const focus = self.focus = assign({}, opts.focus || {alpha: 0.3}, cursor.focus);
 const cursorFocus = focus.prox >= 0;
 const cursorOnePt = cursorFocus && points.one;
@@ -2551,13 +2551,13 @@ s.value = isTime ? (isStr(sv) ? timeSeriesVal(_tzDate, timeSeriesStamp(sv, _fmtD
 s.label = s.label || (isTime ? timeSeriesLabel : numSeriesLabel);
 }
 if (cursorOnePt || i > 0) {
-s.width  = s.width == null ? 1 : s.width;
-s.paths  = s.paths || linearPath || retNull;
+s.width = s.width == null ? 1 : s.width;
+s.paths = s.paths || linearPath || retNull;
 s.fillTo = fnOrSelf(s.fillTo || seriesFillTo);
 s.pxAlign = +ifNull(s.pxAlign, pxAlign);
 s.pxRound = pxRoundGen(s.pxAlign);
 s.stroke = fnOrSelf(s.stroke || null);
-s.fill   = fnOrSelf(s.fill || null);
+s.fill = fnOrSelf(s.fill || null);
 s._stroke = s._fill = s._paths = s._focus = null;
 let _ptDia = ptDia(max(1, s.width), 1);
 let points = s.points = assign({}, {
@@ -2569,11 +2569,11 @@ paths: pointsPath,
 _stroke: null,
 _fill: null,
 }, s.points);
-points.show   = fnOrSelf(points.show);
+points.show = fnOrSelf(points.show);
 points.filter = fnOrSelf(points.filter);
-points.fill   = fnOrSelf(points.fill);
+points.fill = fnOrSelf(points.fill);
 points.stroke = fnOrSelf(points.stroke);
-points.paths  = fnOrSelf(points.paths);
+points.paths = fnOrSelf(points.paths);
 points.pxAlign = s.pxAlign;
 }
 if (showLegend) {
@@ -2633,19 +2633,19 @@ axis.scale = isVt ? series[1].scale : xScaleKey;
 sc = scales[axis.scale];
 }
 let isTime = sc.time;
-axis.size   = fnOrSelf(axis.size);
-axis.space  = fnOrSelf(axis.space);
+axis.size = fnOrSelf(axis.size);
+axis.space = fnOrSelf(axis.space);
 axis.rotate = fnOrSelf(axis.rotate);
 if (isArr(axis.incrs)) {
 axis.incrs.forEach(incr => {
 !fixedDec.has(incr) && fixedDec.set(incr, guessDec(incr));
 });
 }
-axis.incrs  = fnOrSelf(axis.incrs  || (          sc.distr == 2 ? wholeIncrs : (isTime ? (ms == 1 ? timeIncrsMs : timeIncrsS) : numIncrs)));
+axis.incrs = fnOrSelf(axis.incrs || ( sc.distr == 2 ? wholeIncrs : (isTime ? (ms == 1 ? timeIncrsMs : timeIncrsS) : numIncrs)));
 axis.splits = fnOrSelf(axis.splits || (isTime && sc.distr == 1 ? _timeAxisSplits : sc.distr == 3 ? logAxisSplits : sc.distr == 4 ? asinhAxisSplits : numAxisSplits));
-axis.stroke        = fnOrSelf(axis.stroke);
-axis.grid.stroke   = fnOrSelf(axis.grid.stroke);
-axis.ticks.stroke  = fnOrSelf(axis.ticks.stroke);
+axis.stroke = fnOrSelf(axis.stroke);
+axis.grid.stroke = fnOrSelf(axis.grid.stroke);
+axis.ticks.stroke = fnOrSelf(axis.ticks.stroke);
 axis.border.stroke = fnOrSelf(axis.border.stroke);
 let av = axis.values;
 axis.values = (
@@ -2658,14 +2658,14 @@ timeAxisVal(_tzDate, av) :
 av || _timeAxisVals
 ) : av || numAxisVals
 );
-axis.filter = fnOrSelf(axis.filter || (          sc.distr >= 3 && sc.log == 10 ? log10AxisValsFilt : sc.distr == 3 && sc.log == 2 ? log2AxisValsFilt : retArg1));
-axis.font      = pxRatioFont(axis.font);
+axis.filter = fnOrSelf(axis.filter || ( sc.distr >= 3 && sc.log == 10 ? log10AxisValsFilt : sc.distr == 3 && sc.log == 2 ? log2AxisValsFilt : retArg1));
+axis.font = pxRatioFont(axis.font);
 axis.labelFont = pxRatioFont(axis.labelFont);
-axis._size   = axis.size(self, null, i, 0);
-axis._space  =
+axis._size = axis.size(self, null, i, 0);
+axis._space =
 axis._rotate =
-axis._incrs  =
-axis._found  =
+axis._incrs =
+axis._found =
 axis._splits =
 axis._values = null;
 if (axis._size > 0) {
@@ -2766,10 +2766,10 @@ let ctxStroke, ctxFill, ctxWidth, ctxDash, ctxJoin, ctxCap, ctxFont, ctxAlign, c
 let ctxAlpha;
 function setCtxStyle(stroke, width, dash, cap, fill, join) {
 stroke ??= transparent;
-dash   ??= EMPTY_ARR;
-cap    ??= "butt";
-fill   ??= transparent;
-join   ??= "round";
+dash ??= EMPTY_ARR;
+cap ??= "butt";
+fill ??= transparent;
+join ??= "round";
 if (stroke != ctxStroke)
 ctx.strokeStyle = ctxStroke = stroke;
 if (fill != ctxFill)
@@ -2893,7 +2893,7 @@ let psc = pendScales[k];
 if (wsc.from == null && (psc == null || psc.min == null)) {
 let minMax = wsc.range(
 self,
-wsc.min ==  inf ? null : wsc.min,
+wsc.min == inf ? null : wsc.min,
 wsc.max == -inf ? null : wsc.max,
 k
 );
@@ -3006,7 +3006,7 @@ ctx.globalAlpha = ctxAlpha = 1;
 function cacheStrokeFill(si, _points) {
 let s = _points ? series[si].points : series[si];
 s._stroke = s.stroke(self, si);
-s._fill   = s.fill(self, si);
+s._fill = s.fill(self, si);
 }
 function drawPath(si, _points) {
 let s = _points ? series[si].points : series[si];
@@ -3016,8 +3016,8 @@ fill,
 clip: gapsClip,
 flags,
 _stroke: strokeStyle = s._stroke,
-_fill:   fillStyle   = s._fill,
-_width:  width       = s.width,
+_fill: fillStyle = s._fill,
+_width: width = s.width,
 } = s._paths;
 width = roundDec(width * pxRatio, 3);
 let boundsClip = null;
@@ -3130,7 +3130,7 @@ incrSpace = [0, 0];
 else {
 let minSpace = axis._space = axis.space(self, axisIdx, min, max, fullDim);
 let incrs = axis._incrs = axis.incrs(self, axisIdx, min, max, fullDim, minSpace);
-incrSpace    = findIncr(min, max, incrs, fullDim, minSpace);
+incrSpace = findIncr(min, max, incrs, fullDim, minSpace);
 }
 return (axis._found = incrSpace);
 }
@@ -3260,8 +3260,8 @@ let angle = axis._rotate * -PI/180;
 let basePos = pxRound(axis._pos * pxRatio);
 let shiftAmt = (tickSize + axisGap) * shiftDir;
 let finalPos = basePos + shiftAmt;
-y        = ori == 0 ? finalPos : 0;
-x        = ori == 1 ? finalPos : 0;
+y = ori == 0 ? finalPos : 0;
+x = ori == 1 ? finalPos : 0;
 let font = axis.font[0];
 let textAlign = axis.align == 1 ? LEFT :
 axis.align == 2 ? RIGHT :
@@ -3269,7 +3269,7 @@ angle > 0 ? LEFT :
 angle < 0 ? RIGHT :
 ori == 0 ? "center" : side == 3 ? RIGHT : LEFT;
 let textBaseline = angle ||
-ori == 1 ? "middle" : side == 2 ? TOP   : BOTTOM;
+ori == 1 ? "middle" : side == 2 ? TOP : BOTTOM;
 setFontStyle(font, fillStyle, textAlign, textBaseline);
 let lineHeight = axis.font[1] * axis.lineGap;
 let canOffs = _splits.map(val => pxRound(getPos(val, scale, plotDim, plotOff)));
@@ -3396,17 +3396,17 @@ convergeSize();
 shouldConvergeSize = false;
 }
 if (shouldSetSize) {
-setStylePx(under, LEFT,   plotLftCss);
-setStylePx(under, TOP,    plotTopCss);
-setStylePx(under, WIDTH,  plotWidCss);
+setStylePx(under, LEFT, plotLftCss);
+setStylePx(under, TOP, plotTopCss);
+setStylePx(under, WIDTH, plotWidCss);
 setStylePx(under, HEIGHT, plotHgtCss);
-setStylePx(over, LEFT,    plotLftCss);
-setStylePx(over, TOP,     plotTopCss);
-setStylePx(over, WIDTH,   plotWidCss);
-setStylePx(over, HEIGHT,  plotHgtCss);
-setStylePx(wrap, WIDTH,   fullWidCss);
-setStylePx(wrap, HEIGHT,  fullHgtCss);
-can.width  = round(fullWidCss * pxRatio);
+setStylePx(over, LEFT, plotLftCss);
+setStylePx(over, TOP, plotTopCss);
+setStylePx(over, WIDTH, plotWidCss);
+setStylePx(over, HEIGHT, plotHgtCss);
+setStylePx(wrap, WIDTH, fullWidCss);
+setStylePx(wrap, HEIGHT, fullHgtCss);
+can.width = round(fullWidCss * pxRatio);
 can.height = round(fullHgtCss * pxRatio);
 axes.forEach(({ _el, _show, _size, _pos, side }) => {
 if (_el != null) {
@@ -3416,7 +3416,7 @@ let isVt = side % 2 == 1;
 setStylePx(_el, isVt ? "left"   : "top",    _pos - posOffset);
 setStylePx(_el, isVt ? "width"  : "height", _size);
 setStylePx(_el, isVt ? "top"    : "left",   isVt ? plotTopCss : plotLftCss);
-setStylePx(_el, isVt ? "height" : "width",  isVt ? plotHgtCss : plotWidCss);
+setStylePx(_el, isVt ? "height" : "width", isVt ? plotHgtCss : plotWidCss);
 remClass(_el, OFF);
 }
 else
@@ -3437,7 +3437,7 @@ let pctWid = plotWidCss / _plotWidCss;
 let pctHgt = plotHgtCss / _plotHgtCss;
 if (showCursor && !shouldSetCursor && cursor.left >= 0) {
 cursor.left *= pctWid;
-cursor.top  *= pctHgt;
+cursor.top *= pctHgt;
 vCursor && elTrans(vCursor, round(cursor.left), 0, plotWidCss, plotHgtCss);
 hCursor && elTrans(hCursor, 0, round(cursor.top), plotWidCss, plotHgtCss);
 for (let i = 0; i < cursorPts.length; i++) {
@@ -3450,9 +3450,9 @@ elTrans(pt, ceil(cursorPtsLft[i]), ceil(cursorPtsTop[i]), plotWidCss, plotHgtCss
 }
 }
 if (select.show && !shouldSetSelect && select.left >= 0 && select.width > 0) {
-select.left   *= pctWid;
-select.width  *= pctWid;
-select.top    *= pctHgt;
+select.left *= pctWid;
+select.width *= pctWid;
+select.top *= pctHgt;
 select.height *= pctHgt;
 for (let prop in _hideProps)
 setStylePx(selectDiv, prop, select[prop]);
@@ -3560,11 +3560,11 @@ mouseLeft1 = cursor.left;
 mouseTop1 = cursor.top;
 }
 const select = self.select = assign({
-show:   true,
-over:   true,
-left:   0,
-width:  0,
-top:    0,
+show: true,
+over: true,
+left: 0,
+width: 0,
+top: 0,
 height: 0,
 }, opts.select);
 const selectDiv = select.show ? placeDiv(SELECT, select.over ? over : under) : null;
@@ -3716,11 +3716,11 @@ mouseTop1 = opts.top;
 updateCursor(null, _fire, _pub);
 };
 function setSelH(off, dim) {
-setStylePx(selectDiv, LEFT,  select.left = off);
+setStylePx(selectDiv, LEFT, select.left = off);
 setStylePx(selectDiv, WIDTH, select.width = dim);
 }
 function setSelV(off, dim) {
-setStylePx(selectDiv, TOP,    select.top = off);
+setStylePx(selectDiv, TOP, select.top = off);
 setStylePx(selectDiv, HEIGHT, select.height = dim);
 }
 let setSelX = scaleX.ori == 0 ? setSelH : setSelV;
@@ -3833,7 +3833,7 @@ if (dist < closestDist) {
 let bias = focus.bias;
 if (bias != 0) {
 let mouseYVal = posToVal(mouseYPos, s.scale);
-let seriesYValSign = yVal2     >= 0 ? 1 : -1;
+let seriesYValSign = yVal2 >= 0 ? 1 : -1;
 let mouseYValSign = mouseYVal >= 0 ? 1 : -1;
 if (mouseYValSign == seriesYValSign && (
 mouseYValSign == 1 ?
@@ -3943,7 +3943,7 @@ sOff = top;
 sDim = height;
 }
 sc = scales[xKey];
-a = valToPosX(sPosToVal(sOff, xKeySrc),        sc, xDim, 0);
+a = valToPosX(sPosToVal(sOff, xKeySrc), sc, xDim, 0);
 b = valToPosX(sPosToVal(sOff + sDim, xKeySrc), sc, xDim, 0);
 setSelX(min(a,b), abs(b-a));
 }
@@ -3959,7 +3959,7 @@ sOff = top;
 sDim = height;
 }
 sc = scales[yKey];
-a = valToPosY(sPosToVal(sOff, yKeySrc),        sc, yDim, 0);
+a = valToPosY(sPosToVal(sOff, yKeySrc), sc, yDim, 0);
 b = valToPosY(sPosToVal(sOff + sDim, yKeySrc), sc, yDim, 0);
 setSelY(min(a,b), abs(b-a));
 }
@@ -4164,9 +4164,9 @@ onMouse(mouseup, doc, mouseUp, false);
 pubSync(mousedown, self, mouseLeft0, mouseTop0, plotWidCss, plotHgtCss, null);
 }
 let { left, top, width, height } = select;
-downSelectLeft   = left;
-downSelectTop    = top;
-downSelectWidth  = width;
+downSelectLeft = left;
+downSelectTop = top;
+downSelectWidth = width;
 downSelectHeight = height;
 }
 function mouseUp(e, src, _l, _t, _w, _h, _i) {
@@ -4175,9 +4175,9 @@ cacheMouse(e, src, _l, _t, _w, _h, _i, false, true);
 let { left, top, width, height } = select;
 let hasSelect = width > 0 || height > 0;
 let chgSelect = (
-downSelectLeft   != left   ||
-downSelectTop    != top    ||
-downSelectWidth  != width  ||
+downSelectLeft != left ||
+downSelectTop != top ||
+downSelectWidth != width ||
 downSelectHeight != height
 );
 hasSelect && chgSelect && setSelect(select);
@@ -4240,7 +4240,7 @@ dragV = dragX;
 }
 if (dragH && dragV) {
 snapH = mouseLeft1 <= snapProx || mouseLeft1 >= plotWidCss - snapProx;
-snapV = mouseTop1  <= snapProx || mouseTop1  >= plotHgtCss - snapProx;
+snapV = mouseTop1 <= snapProx || mouseTop1 >= plotHgtCss - snapProx;
 }
 if (dragH && snapH)
 mouseLeft1 = mouseLeft1 < mouseLeft0 ? 0 : plotWidCss;
@@ -4281,8 +4281,8 @@ idx = seriesIdxMatcher(self, src, idx);
 idx != -1 && setSeries(idx, opts, true, false);
 };
 if (showCursor) {
-onMouse(mousedown,  over, mouseDown);
-onMouse(mousemove,  over, mouseMove);
+onMouse(mousedown, over, mouseDown);
+onMouse(mousemove, over, mouseMove);
 onMouse(mouseenter, over, e => {
 setCursorEvent(e);
 syncRect(false);
@@ -4375,14 +4375,14 @@ uPlot.fmtNum = fmtNum;
 uPlot.rangeNum = rangeNum;
 uPlot.rangeLog = rangeLog;
 uPlot.rangeAsinh = rangeAsinh;
-uPlot.orient   = orient;
+uPlot.orient = orient;
 uPlot.pxRatio = pxRatio;
 {
 uPlot.join = join;
 }
 {
 uPlot.fmtDate = fmtDate;
-uPlot.tzDate  = tzDate;
+uPlot.tzDate = tzDate;
 }
 uPlot.sync = _sync;
 {
@@ -4391,9 +4391,9 @@ uPlot.clipGaps = clipGaps;
 let paths = uPlot.paths = {
 points,
 };
-(paths.linear  = linear);
+(paths.linear = linear);
 (paths.stepped = stepped);
-(paths.bars    = bars);
-(paths.spline  = monotoneCubic);
+(paths.bars = bars);
+(paths.spline = monotoneCubic);
 }
 export { uPlot as default };

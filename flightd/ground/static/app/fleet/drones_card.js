@@ -5,7 +5,7 @@ import { html } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
 import { handOver } from "../live/manager.js";
 import { selectDrone, state } from "../store.js";
-import { duration, isTroubled, percent, phaseWords } from "../words.js";
+import { duration, percent, phaseWords } from "../words.js";
 import { Badge } from "./drone_badge.js";
 
 export function DronesCard({ marks, told, hall }) {
@@ -23,7 +23,7 @@ function Row({ name, mark, told, hall }) {
   const { status, welcome, manager } = known ?? {};
   const site = welcome?.floor.name ?? "";
   return html`
-    <li class=${status && isTroubled(status) ? "fleet-drone troubled" : "fleet-drone"}>
+    <li class="fleet-drone">
       <${Badge} mark=${mark} />
       <div class="fleet-words">
         <p><strong>${name}</strong> <span>${status ? phaseWords(status) : say("Not heard yet")}</span></p>

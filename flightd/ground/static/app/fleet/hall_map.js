@@ -2,9 +2,9 @@
 // the air that is closed for the others.  Its nodes may be chosen for a tour.
 import { html, useMemo } from "../html.js";
 import { english, say } from "../language.js";
-import { Legend, M, markScale } from "../live/map_marks.js";
+import { Legend, M, markScale, Nodes } from "../live/map_marks.js";
+import { NodeButtons } from "../live/node_buttons.js";
 import { bounds, Floor } from "../live/site_plan.js";
-import { ToggledNodes } from "../live/toggled_nodes.js";
 import { phaseWords } from "../words.js";
 import { Badge, Mark } from "./drone_badge.js";
 import { fleet, toggleNode } from "./fleet_state.js";
@@ -16,7 +16,8 @@ const MARKS = [
   ["shut", english("closed for others")],
   ["keep", english("keep out")],
 ];
-const OVER_RELEASED = 2; // nodes after which a way that is flown is told no more where no traffic flies it
+const OVER_NEXT = 2; // nodes of its way that are drawn of a drone that no traffic flies
+const NONE = new Set();
 const at = ({ x_m: x, y_m: y }) => `${x * M},${y * M}`;
 
 export function HallMap({ drones, marks, told, mayChoose }) {
@@ -44,8 +45,8 @@ export function HallMap({ drones, marks, told, mayChoose }) {
         ${seen.map((one) => html`<${Shut} key=${one.name} told=${one.told} nodes=${nodes} />`)}
         ${seen.map((one) => html`<${Released} key=${one.name} ...${one} nodes=${nodes} />`)}
         ${mayChoose
-          ? html`<${ToggledNodes} floor=${floor} chosen=${chosen} entry=${chosen[0] ?? floor.home} onToggle=${toggleNode} scale=${scale} />`
-          : floor.nodes.map((node) => html`<g key=${node.id} class="node still" transform=${`translate(${node.x_m * M} ${node.y_m * M}) scale(${scale})`} aria-hidden="true"><circle class="mark" r="9" /><text x="14" y="36">${node.id}</text></g>`)}
+          ? html`<${NodeButtons} picks floor=${floor} chosen=${chosen} entry=${chosen[0] ?? floor.home} onPress=${toggleNode} scale=${scale} />`
+          : html`<${Nodes} floor=${floor} visited=${NONE} scale=${scale} />`}
         ${seen.map((one) => html`<${Tour} key=${one.name} ...${one} nodes=${nodes} scale=${scale} />`)}
         ${seen.map((one) => html`<${OnMap} key=${one.name} ...${one} scale=${scale} />`)}
       </svg>
@@ -58,7 +59,7 @@ export function HallMap({ drones, marks, told, mayChoose }) {
 // Where traffic flies it, its base; else the way that it tells.
 function Released({ known, floor, told, mark, nodes }) {
   const from = placeOf({ known, floor }, told);
-  const ids = told ? told.base : (known.status?.way ?? []).slice(0, OVER_RELEASED);
+  const ids = told ? told.base : (known.status?.way ?? []).slice(0, OVER_NEXT);
   const way = ids.map((id) => nodes.get(id)).filter(Boolean);
   if (!from || !way.length) return null;
   return html`<polyline class=${`base d${mark.kind}`} points=${[from, ...way].map(at).join(" ")} aria-hidden="true" />`;

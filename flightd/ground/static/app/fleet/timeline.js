@@ -27,7 +27,7 @@ export function Timeline({ told, marks }) {
       <h3 id="timeline">${say("Timeline")}</h3>
       <div class="timeline-rows">
         ${drones.map(([name, { past, plan, flown }]) => html`<${Row} key=${name} name=${name} mark=${marks.get(name)} past=${past.filter((one) => one.end_s > begin)} plan=${plan.filter((one) => one.begin_s < end)} flown=${flown} at=${at} />`)}
-        <div class="timeline-scale" aria-hidden="true"><span class="timeline-name" /><div class="timeline-track">${ticks(begin, end).map((seconds) => html`<span key=${seconds} class=${seconds ? "tick" : "tick now"} style=${{ left: `${at(seconds)}%` }}>${tickWords(seconds)}</span>`)}</div></div>
+        <div class="timeline-scale" aria-hidden="true"><span class="timeline-name" /><div class="timeline-track">${ticks(begin, end).map(([seconds, kind]) => html`<span key=${seconds} class=${`tick ${kind}`} style=${{ left: `${at(seconds)}%` }}>${tickWords(seconds)}</span>`)}</div></div>
       </div>
       <ul class="legend" aria-label=${say("Legend")}>
         <li><i class="mark-released" />${say("released")}</li>
@@ -78,7 +78,7 @@ function wordsOf({ act, node, begin_s: begin, end_s: end }, kind) {
 function ticks(begin, end) {
   const step = STEPS_S.find((one) => (end - begin) / one <= MOST_TICKS) ?? STEPS_S.at(-1);
   const found = [];
-  for (let at = Math.ceil(begin / step) * step; at <= end - step / 4; at += step) found.push(at);
+  for (let at = Math.ceil(begin / step) * step; at <= end - step / 4; at += step) found.push([at, at === 0 ? "now" : (at / step) % 2 ? "minor" : ""]);
   return found;
 }
 

@@ -3,7 +3,8 @@
 import { html, useMemo } from "../html.js";
 import { english, say } from "../language.js";
 import { shown, state, update } from "../store.js";
-import { around, ChoosableNodes, Drone, Legend, M, markScale, Seen, Track, Way } from "./map_marks.js";
+import { around, Drone, Legend, M, markScale, Seen, Track, Way } from "./map_marks.js";
+import { NodeButtons } from "./node_buttons.js";
 import { Floor, bounds } from "./site_plan.js";
 
 const MARKS = [
@@ -43,8 +44,10 @@ export function FloorMap({ floor }) {
         <${Seen} lines=${seenLines(status)} />
         <${Way} from=${position} way=${way} />
         <${Track} points=${track} />
-        <${ChoosableNodes}
-          floor=${floor} visited=${visited} goal=${status?.goal} chosen=${state.chosenNode} onChoose=${choose} scale=${scale}
+        <${NodeButtons}
+          floor=${floor} visited=${visited} goal=${status?.goal} chosen=${[state.chosenNode]} entry=${state.chosenNode || floor.home}
+          onPress=${choose} onMove=${choose} scale=${scale}
+          name=${(node) => say(visited.has(node) ? english("Node {node}, visited") : english("Node {node}"), { node })}
         />
         ${position && html`<${Drone} position=${position} scale=${scale} />`}
       </svg>

@@ -1,7 +1,6 @@
 // What is drawn on a map over the site: nodes, tracks, ways, drones.  The same live and played back.
 import { html } from "../html.js";
-import { english, say } from "../language.js";
-import { nextInDirection } from "./map_keys.js";
+import { say } from "../language.js";
 
 export const M = 100; // units of the drawing per metre
 const SURE = 2; // standard deviations that are drawn
@@ -44,45 +43,13 @@ export function Seen({ lines }) {
   `;
 }
 
-// The nodes, to choose one of them by mouse or keys.
-export function ChoosableNodes({ floor, visited, goal, chosen, onChoose, scale }) {
-  const inTabOrder = chosen || floor.home;
-  const onKey = (event, node) => {
-    const next = nextInDirection(floor.nodes, node, event.key);
-    if (next) {
-      onChoose(next.id);
-      document.getElementById(`node-${next.id}`)?.focus();
-    } else if (event.key === "Enter" || event.key === " ") onChoose(node.id);
-    else return;
-    event.preventDefault();
-  };
-  return floor.nodes.map(
-    (node) => html`
-      <g
-        key=${node.id}
-        id=${`node-${node.id}`}
-        class=${nodeClass(node.id, chosen, visited, goal)}
-        transform=${nodeTransform(node, scale)}
-        role="button"
-        aria-pressed=${node.id === chosen}
-        aria-label=${say(visited.has(node.id) ? english("Node {node}, visited") : english("Node {node}"), { node: node.id })}
-        tabindex=${node.id === inTabOrder ? 0 : -1}
-        onClick=${() => onChoose(node.id)}
-        onKeyDown=${(event) => onKey(event, node)}
-      >
-        <circle class="touch" r="32" /><${NodeMark} id=${node.id} />
-      </g>
-    `,
-  );
-}
-
 // The nodes, to look at.
 export function Nodes({ floor, visited, goal, scale }) {
   return floor.nodes.map(
     (node) => html`
       <g
         key=${node.id}
-        class=${`${nodeClass(node.id, "", visited, goal)} still`}
+        class=${`${nodeClass(node.id, false, visited, goal)} still`}
         transform=${nodeTransform(node, scale)}
         aria-hidden="true"
       >
@@ -92,15 +59,15 @@ export function Nodes({ floor, visited, goal, scale }) {
   );
 }
 
-const NodeMark = ({ id }) => html`<circle class="mark" r="9" /><text x="14" y="30">${id}</text>`;
+export const NodeMark = ({ id, r = 9 }) => html`<circle class="mark" r=${r} /><text x="14" y="32">${id}</text>`;
 
-const nodeTransform = (node, scale) => `translate(${node.x_m * M} ${node.y_m * M}) scale(${scale})`;
+export const nodeTransform = (node, scale) => `translate(${node.x_m * M} ${node.y_m * M}) scale(${scale})`;
 
-function nodeClass(id, chosen, visited, goal) {
+export function nodeClass(id, isChosen, visited, goal) {
   const classes = ["node"];
   if (visited.has(id)) classes.push("visited");
   if (goal === id) classes.push("goal");
-  if (id === chosen) classes.push("chosen");
+  if (isChosen) classes.push("chosen");
   return classes.join(" ");
 }
 

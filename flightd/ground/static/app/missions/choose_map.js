@@ -2,8 +2,8 @@
 import { html, useMemo } from "../html.js";
 import { english, say } from "../language.js";
 import { Drone, Legend, M, markScale } from "../live/map_marks.js";
+import { NodeButtons } from "../live/node_buttons.js";
 import { bounds, Floor } from "../live/site_plan.js";
-import { ToggledNodes } from "../live/toggled_nodes.js";
 import { shown } from "../store.js";
 import { missions, toggleNode } from "./missions_state.js";
 
@@ -61,5 +61,5 @@ function Nodes({ floor, order, scale }) {
     const place = order ? order.indexOf(node) + 1 : 0;
     return say(isChosen && place ? english("Node {node}, flown as number {place}") : english("Node {node}"), { node, place });
   };
-  return html`<${ToggledNodes} floor=${floor} chosen=${chosen} entry=${chosen[0] ?? floor.home} onToggle=${toggleNode} scale=${scale} name=${name} />`;
+  return html`<${NodeButtons} picks floor=${floor} chosen=${chosen} entry=${chosen[0] ?? floor.home} onPress=${toggleNode} scale=${scale} name=${name} />`;
 }
