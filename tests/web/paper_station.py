@@ -28,15 +28,25 @@ BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
 _READY_S = 30.0
 
 
+class HeldDrone(PaperDrone):
+    """It takes every order, and while it is `held` comes no further with any: whatever the machine's speed."""
+
+    held = True
+
+    def _fly(self) -> None:
+        if not self.held:
+            super()._fly()
+
+
 class PaperLink:
-    """`DroneLink` to a drone on paper."""
+    """`DroneLink` to a drone on paper, which is held at first."""
 
     def __init__(self, name: str, _address: Address, pages: Pages) -> None:
         def tell(drone: str, topic: str, value: Any) -> None:
             pages.tell(drone, topic, {"cameras": (), **value} if topic == "welcome" else value)
 
         self.name = name
-        self.drone = PaperDrone(name, hall(name), tell)
+        self.drone = HeldDrone(name, hall(name), tell)
         self.on_plan: object = None
         self.attends_run = False
         self.is_reached = True
