@@ -29,7 +29,7 @@ _READY_S = 30.0
 
 
 class HeldDrone(PaperDrone):
-    """It takes every order, and while it is `held` comes no further with any: whatever the machine's speed."""
+    """It takes every order, and while it is `held` comes no further, whatever the machine's speed."""
 
     held = True
 
@@ -111,7 +111,9 @@ def paper_station(
         own = OwnFleet(names, BODY, OrderRules(60.0, lambda *_: None)) if fleet else None
         drones = [(name, Address("127.0.0.1", 1, 2)) for name in names]
         station.own = own
-        async with served(*drones, folder=folder, state=folder / "state", login=login, own_fleet=own) as where:
+        async with served(
+            *drones, folder=folder, state=folder / "state", login=login, own_fleet=own
+        ) as where:
             station.url = _url(where)
             station.ready.set()
             await over.wait()

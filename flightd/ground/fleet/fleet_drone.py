@@ -31,6 +31,7 @@ _FULL_S: Final = 600.0
 """Of a drone that tells no charge: its own rules bring it home."""
 _DOUBTS_M: Final = 3.0
 """By how much a drone may be off that looks for its place, or tells none: a node beside its own."""
+_IS_OVER: Final = "its flight is over: it flies the next one once its flightd was started anew"
 _SIGMAS: Final = 3.0
 _CALLED_OFF_EVERY_S: Final = 2.0
 _STARTS_WITHIN_S: Final = 60.0
@@ -99,10 +100,10 @@ class FleetDrone:
             return "nothing shows that it stands on its pad; give it back once it does"
         if self.drone.is_taken or self.air.is_believed is False:
             return "a person has it" if self.drone.is_taken else "it was started anew in flight"
-        if status.phase is Phase.DONE and self.air.rests:
-            return "its flight is over: it flies the next one once its flightd was started anew"
         if not self.drone.is_automatic:
-            return f"it takes no orders now: {status.phase}, {status.reason}".removesuffix(", ")
+            is_over = status.phase is Phase.DONE and self.air.rests
+            why = f"it takes no orders now: {status.phase}, {status.reason}".removesuffix(", ")
+            return _IS_OVER if is_over else why
         return self._refused or "it is not where traffic could fly it on from"
 
     def _is_on_base(self, status: StatusReport) -> bool:
