@@ -52,7 +52,7 @@ class SharedEvidence:
 
     def __init__(self, url: str) -> None:
         """InputError, UnavailableError as `SharedFolder`."""
-        self._folder = SharedFolder(url, "", f"--evidence {url}", what="--evidence URL", make=True)
+        self._folder = SharedFolder(url, "", "--evidence", what="--evidence URL", make=True)
 
     def has(self, name: str) -> bool:
         return self._folder.has(_at(name))

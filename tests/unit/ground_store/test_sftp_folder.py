@@ -90,4 +90,4 @@ def test_a_place_for_pictures_that_cannot_be_had_is_one_line(tmp_path: Path) -> 
     ):
         with pytest.raises(UnavailableError, match=said) as refused:
             opened_store(str(tmp_path / "counts.db"), url)
-        assert str(refused.value).startswith(f"--evidence {url}: {url}: cannot be opened: ")
+        assert str(refused.value).startswith(f"--evidence: {url}: cannot be opened: ")
