@@ -1,4 +1,4 @@
-"""The page Fleet in a real browser: have nodes visited, see who is not flown and why, stop all, see the week."""
+"""The page Fleet in a browser: have nodes visited, see who is not flown and why, stop all, see the week."""
 
 from __future__ import annotations
 

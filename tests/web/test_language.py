@@ -32,6 +32,7 @@ expect.set_options(timeout=40_000.0)
 PAGES = (
     ("/", "Flugbereit"),
     ("/stock?store=monday&place=AL-01-1-1", "ein Code, verbürgt"),
+    ("/fleet", "Menschen fliegen diese Drohnen"),
     ("/missions", "Knoten auf der Karte wählen"),
     ("/flights", "1 Flug"),
     ("/studio", "Bildsätze"),

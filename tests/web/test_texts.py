@@ -26,7 +26,7 @@ SAME = {
     "Autopilot", "CSV, {separator}, {encoding}", "Codes", "Export", "Live", "Mission", "Name", "Pause",
     "Position", "STOP", "Start", "Start: {why}", "Station", "Studio", "VDMA LIF", "Version {number}",
     "Zoom", "camera.cx_px {cx}, cy_px {cy}", "camera.latency_s = {seconds}", "orange", "{exposure} ms",
-    "{figure}: {share} %, {name} {other} %", "{name}: {why}", "{node}: {why}",
+    "{figure}: {share} %, {name} {other} %", "{name}: {why}",
 }  # fmt: skip
 """German and English alike."""
 COMPOSED = {

@@ -44,7 +44,7 @@ function Day({ day, runs }) {
   const isToday = day === today();
   return html`
     <li class=${isToday ? "day today" : "day"}>
-      <h4>${DAY.format(new Date(`${day}T12:00:00Z`))}${isToday && html` <small>${say("today")}</small>`}</h4>
+      <h4>${DAY.format(new Date(`${day}T12:00:00Z`))}${isToday && html` <small>${say("Today")}</small>`}</h4>
       ${runs.length > 0 && html`<ul>${runs.map((run) => html`<${Run} key=${`${run.schedule} ${run.at}`} run=${run} />`)}</ul>`}
     </li>
   `;
@@ -62,11 +62,11 @@ function Run({ run }) {
 }
 
 function stateOf({ state: how, cause, why, quiet, drone, plan }) {
-  if (how === "due") return quiet ? { words: say("held back by quiet hours"), kind: "waiting" } : { words: say("due"), kind: "due" };
+  if ((how === "due" && quiet) || (how === "waiting" && cause === "quiet")) return { words: say("held back by quiet hours"), kind: "waiting" };
+  if (how === "due") return { words: say("due"), kind: "due" };
   if (how === "suspended") return { words: say("suspended"), kind: "suspended" };
   if (how === "ordered") return { words: say("ordered"), kind: "due" };
   if (how === "started") return fliesNow(drone, plan) ? { words: say("flies now"), kind: "flies" } : { words: say("done: it was started"), kind: "done" };
-  if (how === "waiting" && cause === "quiet") return { words: say("held back by quiet hours"), kind: "waiting" };
   if (how === "waiting") return { words: sayWith("waits: {why}", { why: quoted(why) }), kind: "waiting" };
   if (how === "missed") return { words: why ? sayWith("missed: {why}", { why: quoted(why) }) : say("missed"), kind: "missed" };
   return { words: sayWith("nobody knows whether it flew: {why}", { why: quoted(why) }), kind: "missed" };

@@ -6,7 +6,7 @@ import { quoted, say, sayWith } from "../language.js";
 import { handOver } from "../live/manager.js";
 import { selectDrone, state } from "../store.js";
 import { duration, percent, phaseWords } from "../words.js";
-import { Badge } from "./drone_badge.js";
+import { Badge } from "./the_drones.js";
 
 export function DronesCard({ marks, told, hall }) {
   const names = state.station?.drones ?? [];

@@ -4,13 +4,12 @@ import { html, useEffect } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
 import { state } from "../store.js";
 import { CalendarCard } from "./calendar_card.js";
-import { marksOf } from "./drone_badge.js";
 import { DronesCard } from "./drones_card.js";
 import { change, fleet, loadFleet } from "./fleet_state.js";
 import { HallMap } from "./hall_map.js";
 import { StopAll } from "./stop_all.js";
+import { heardOf, marksOf } from "./the_drones.js";
 import { Timeline } from "./timeline.js";
-import { heardOf } from "./whereabouts.js";
 import { WorkCard } from "./work_card.js";
 
 const AGAIN_MS = 1000;
@@ -75,7 +74,6 @@ function Traffic({ told, none, trouble }) {
     return html`
       <section class="card" aria-labelledby="no-fleet"><h3 id="no-fleet">${say("People fly these drones")}</h3>
         <p>${sayWith("The station flies them together where it is started with {option}: each from a pad of its own, all by the same map.", { option: html`<code>--fleet</code>` })}</p>
-        <p><code>flightd ground --drone a=drone-1 --drone b=drone-2 --fleet</code></p>
         <p><a href="/guide/fleet">${say("In the guide")}</a></p>
       </section>`;
   }

@@ -6,9 +6,8 @@ import { Legend, M, markScale, Nodes } from "../live/map_marks.js";
 import { NodeButtons } from "../live/node_buttons.js";
 import { bounds, Floor } from "../live/site_plan.js";
 import { phaseWords } from "../words.js";
-import { Badge, Mark } from "./drone_badge.js";
 import { fleet, toggleNode } from "./fleet_state.js";
-import { padsOf, placeOf } from "./whereabouts.js";
+import { Badge, Mark, padsOf, placeOf } from "./the_drones.js";
 
 const MARKS = [
   ["base", english("released to a drone")],

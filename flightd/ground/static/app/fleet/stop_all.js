@@ -31,7 +31,7 @@ export function StopAll({ names }) {
         ${isArmed && html`<span>${say("Armed for 5 seconds: press again to stop every drone.")}</span><i class="stop-all-left" aria-hidden="true" />`}
         ${stop && !isArmed && html`<${Outcomes} names=${names} stop=${stop} />`}
       </div>
-      ${stop?.stage === "told" && html`<button class="tab" onClick=${() => change({ stop: null })}>${say("Hide")}</button>`}
+      ${stop?.stage === "told" && html`<button class="tab" onClick=${() => change({ stop: null })}>${say("Close")}</button>`}
     </section>
   `;
 }

@@ -3,7 +3,7 @@
 import { html } from "../html.js";
 import { english, say } from "../language.js";
 import { capital, duration } from "../words.js";
-import { Badge } from "./drone_badge.js";
+import { Badge } from "./the_drones.js";
 
 const LEAST_S = 60;
 const MOST_S = 600;

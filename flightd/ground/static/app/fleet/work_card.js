@@ -3,8 +3,8 @@ import { mayOperate, signedInName } from "../access/session.js";
 import { html, useState } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
 import { aislesOf, Chip } from "../picks.js";
-import { Badge } from "./drone_badge.js";
 import { askTour, change, choose, fleet, toggleNode, toggleNodes } from "./fleet_state.js";
+import { Badge } from "./the_drones.js";
 
 const MOST_SHOWN = 60;
 
@@ -23,7 +23,7 @@ export function WorkCard({ told, marks, floor }) {
         ${Object.entries(by).map(
           ([drone, nodes]) => html`<div key=${drone}><dt class="given"><${Badge} mark=${marks.get(drone)} />${say("{name} visits", { name: drone })}</dt><dd><${Names} nodes=${nodes.map(([node]) => node)} /></dd></div>`,
         )}
-        ${notDone.length > 0 && html`<div><dt class="not-flown">${say("Not done")}</dt><dd><ul>${notDone.slice(0, MOST_SHOWN).map(([node, why]) => html`<li key=${node}>${sayWith("{node}: {why}", { node: html`<strong>${node}</strong>`, why: quoted(why) })}</li>`)}</ul></dd></div>`}
+        ${notDone.length > 0 && html`<div><dt class="not-flown">${say("Not done")}</dt><dd><ul>${notDone.slice(0, MOST_SHOWN).map(([node, why]) => html`<li key=${node}>${sayWith("{name}: {why}", { name: html`<strong>${node}</strong>`, why: quoted(why) })}</li>`)}</ul></dd></div>`}
         ${told.done.length > 0 && html`<div><dt class="flown">${say("Done")}</dt><dd><${Names} nodes=${told.done} /></dd></div>`}
       </dl>
     </section>
