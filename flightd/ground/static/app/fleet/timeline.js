@@ -20,7 +20,7 @@ const ACTS = {
 export function Timeline({ told, marks }) {
   const drones = Object.entries(told.drones);
   const end = Math.min(Math.max(LEAST_S, ...drones.flatMap(([, { plan }]) => plan.map((one) => one.end_s))), MOST_S);
-  const begin = drones.some(([, { past }]) => past.some((one) => one.end_s > -PAST_S)) ? -Math.min(PAST_S, end) : 0;
+  const begin = drones.some(([, { past }]) => past.some((one) => one.end_s > -PAST_S)) ? -Math.min(PAST_S, end / 2) : 0;
   const at = (seconds) => (100 * (Math.min(Math.max(seconds, begin), end) - begin)) / (end - begin);
   return html`
     <section class="card timeline" aria-labelledby="timeline">
@@ -55,7 +55,7 @@ function Row({ name, mark, past, plan, flown, at }) {
   `;
 }
 
-const SHORT = 4; // percent of the row: a bar that is shorter has no name in it
+const SHORT = 3; // percent of the row: a bar that is shorter has no name in it
 
 function Bar({ one, kind, at }) {
   const [left, right] = [at(one.begin_s), at(one.end_s)];
