@@ -57,6 +57,7 @@ NO_PAGE = {
     "ground/foxglove_view": "options of the command line, and Foxglove's own connection",
     "ground/access/key_book.py": "of the command line",
     "ground/ground_store": "of the command line, of programs that deliver, and of the station's start",
+    "ground/shared_folder.py": "of the command line: the pictures of a store, and exchange with a WMS",
     "ground/store_api": "for programs, which are told in English",
     "ground/guide_pages/rendering.py": "markup of the guide, which is English",
     "ground/mqtt": "options of the command line, and the broker's own connection",

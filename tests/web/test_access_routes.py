@@ -38,6 +38,7 @@ from tests.web.stock_rig import counted_store
 NOBODY = ("demo", Address("127.0.0.1", 1, 1))
 ANYBODYS = {
     "GET /", "GET /stock", "GET /stock/{rest:path}", "GET /flights", "GET /flights/{rest:path}", "GET /guide",
+    "GET /fleet", "GET /fleet/{rest:path}",
     "GET /site", "GET /site/{rest:path}", "GET /missions", "GET /missions/{rest:path}",
     "GET /studio", "GET /studio/{rest:path}", "GET /doctor", "GET /doctor/{rest:path}",
     "GET /guide/{rest:path}", "MOUNT /static", "GET /api/session", "POST /api/session", "DELETE /api/session",
