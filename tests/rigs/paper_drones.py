@@ -68,6 +68,7 @@ class PaperDrone:
         self.heard = self.sees = True
         self.counts = self.never_starts = False
         self.plan = ""
+        self._plan_waits = False
         self._nodes: tuple[str, ...] = ()
         self._session = 0
         self._events: list[EventReport] = []
@@ -76,12 +77,14 @@ class PaperDrone:
         self.commands: list[str] = []
         self.truth = FleetDrone(name, 0, random.Random(0))
         self.way: list[str] = []
+        self._waits_before = 0
         self.begin_anew()
 
     def begin_anew(self, *, on_pad: bool = True) -> None:
         """Its daemon begins anew, believing to be on its pad."""
         self._session += 1
         self.phase, self.way, self.paused, self.left_s = Phase.PREFLIGHT, [], False, 900.0
+        self.waits = False
         self.ends_as = Phase.DONE
         self._timer_s = 0.0
         self._begins_in_air = self.truth.z_m > 0.0 and not on_pad
@@ -102,6 +105,11 @@ class PaperDrone:
         """Its own rules land it where it is."""
         self.phase, self._timer_s, self.way, self.ends_as = Phase.LAND, 0.0, [], Phase.ABORTED
 
+    def turn_home(self) -> None:
+        """Its battery, or an order, sends it home: nobody sends it anywhere any more."""
+        self.plan, self.paused = "", False
+        self._fly_over(self.way[:1], waits=False)
+
     # as DroneLink
 
     @property
@@ -120,14 +128,16 @@ class PaperDrone:
         match act.command:
             case CommandKind.START:
                 self.phase, self._timer_s = Phase.TAKE_OFF, 0.0
-                self.way = [*self._nodes, *self._home_from(self._nodes[-1])]
+                self._fly_over(self._nodes, waits=self._plan_waits)
+            case CommandKind.GOTO if self.waits_at == act.node == here and not act.waits:
+                self._fly_over([here], waits=False)
             case CommandKind.GOTO:
-                self.way = [here, act.node, *self._home_from(act.node)]
+                rests = self._is_at_end and self.phase is Phase.HOLD
+                self._fly_over([act.node] if rests else [here, act.node], waits=act.waits)
             case CommandKind.PAUSE | CommandKind.RESUME:
                 self.paused = act.command is CommandKind.PAUSE
             case CommandKind.HOME:
-                self.plan, self.paused = "", False  # nobody sends it anywhere any more
-                self.way = [here, *self._home_from(here)]
+                self.turn_home()
             case CommandKind.LAND | CommandKind.STOP:
                 self.come_down()
         return Accepted(version=1, request=act.id)
@@ -136,7 +146,7 @@ class PaperDrone:
         self, nodes: Sequence[str], levels: Sequence[int], order_id: str = "", **how: Any
     ) -> Planned:
         if not how.get("dry"):
-            self.plan, self._nodes = order_id, tuple(nodes)
+            self.plan, self._nodes, self._plan_waits = order_id, tuple(nodes), how.get("waits", False)
             self._event("command", "plan")
         way = (self.site.home.node, *nodes, self.site.home.node)
         return Planned(
@@ -160,6 +170,19 @@ class PaperDrone:
                 self._tell(self.name, "events", tuple(self._events))
                 self._tell(self.name, "status", self.status)
 
+    def _fly_over(self, nodes: Sequence[str], *, waits: bool) -> None:
+        home = self._home_from(nodes[-1])
+        self.way = [*nodes, *nodes[-1:] * waits, *home]
+        self.waits, self._waits_before = waits, len(home)
+
+    @property
+    def _is_at_end(self) -> bool:
+        return self.waits and len(self.way) == self._waits_before + 1
+
+    @property
+    def waits_at(self) -> str:
+        return self.way[-self._waits_before - 1] if self.waits and self.way else ""
+
     def _home_from(self, node: str) -> list[str]:
         """Onto the pad: its node comes twice where the drone is there."""
         return [*self.site.path(node, self.site.home.node)[1:], self.site.home.node]
@@ -173,7 +196,7 @@ class PaperDrone:
             case Phase.TAKE_OFF:
                 self.truth.z_m = 1.5
                 self._begin(Phase.FOLLOW)
-            case Phase.HOVER if self._holds:
+            case Phase.HOVER if self._holds or self._is_at_end:
                 self._begin(Phase.HOLD)
             case Phase.HOVER:
                 self._event("visited", self.way.pop(0))
@@ -182,7 +205,7 @@ class PaperDrone:
                 self._begin(Phase.HOLD)
             case Phase.FOLLOW:
                 self._go()
-            case Phase.HOLD if not self.paused:
+            case Phase.HOLD if not self.paused and not self._is_at_end:
                 self._begin(Phase.FOLLOW)
             case Phase.LAND:
                 self.truth.z_m = 0.0
@@ -239,4 +262,5 @@ class PaperDrone:
             nodes_planned=0, height_m=self.truth.z_m, position=at, lines=(), lines_age_s=0.0, vehicle=vehicle,
             frames=0, frames_dropped=0, fps=30.0, latency_ms={}, link=LinkReport(0, 0, 0, 0, 0),
             way=tuple(self.way), possible=self._possible, plan=self.plan, battery_left_s=self.left_s,
+            waits_at=self.waits_at,
         )  # fmt: skip

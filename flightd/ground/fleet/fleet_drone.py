@@ -101,8 +101,8 @@ class FleetDrone:
     def _is_on_base(self, status: StatusReport) -> bool:
         """By what traffic released: who is paused on a lane has nothing ahead as a vehicle."""
         base = {self._node_of(step) for step in self._base}
-        vehicle, home = self.drone.vehicle, self._floor.pads[self.name].node
-        return not status.way or status.way[0] in base | {vehicle.last_node, *vehicle.ahead, home}
+        vehicle = self.drone.vehicle
+        return not status.way or status.way[0] in base | {vehicle.last_node, *vehicle.ahead}
 
     @property
     def waits(self) -> bool:

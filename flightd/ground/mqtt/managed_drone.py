@@ -397,12 +397,13 @@ class ManagedDrone:
                     act_id,
                     session=status.session,
                     seen_ns=status.stamp_ns,
+                    waits=status.waits_at is not None,
                     by_person=False,
                 )
                 self._planned, self._counts.levels = (act_id, act.nodes), levels
             else:
                 plan = self._planned[0] if act.kind is CommandKind.START and self._planned else ""
-                order = Act(act_id, act.kind, act.node, plan, status.session, status.stamp_ns)
+                order = Act(act_id, act.kind, act.node, plan, status.session, status.stamp_ns, act.waits)
                 await link.act(order, by_person=False)
             self._trouble = None
         except FlightdError as err:

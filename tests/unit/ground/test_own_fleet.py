@@ -166,7 +166,11 @@ def test_who_is_silent_has_his_way_home_to_himself_until_he_is_heard() -> None:
         b.heard = False
         fleet.own.ask(["B2"], "c")
         await until(lambda: not fleet.flown("b"))
-        await until(lambda: b.phase is Phase.DONE, 200)  # nobody pauses it at the end of its base
+        await until(lambda: b.phase is Phase.HOLD, 60)
+        await asyncio.sleep(60.0)
+        assert (b.phase, b.way[0]) == (Phase.HOLD, "B3"), "nobody paused it at the end of its base"
+        b.turn_home()
+        await until(lambda: b.phase is Phase.DONE, 200)
         assert fleet.state["done"] == [], "nobody was sent into its way"
         b.heard = True
         await until(lambda: fleet.pages["b", "manager"] == {"flies": False})
@@ -287,6 +291,17 @@ def test_no_drone_is_sent_home_through_the_air_of_another_one() -> None:
         assert b.commands[-1] == "home"
 
     fly(go, "ab")
+
+
+def test_who_makes_for_home_by_himself_is_flown_by_somebody_else() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B4"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        b.way, b.waits = ["B1", "B1"], False  # whatever its reason, and though it could be sent on
+        await until(lambda: not fleet.flown("b"), 5)
+
+    fly(go, "b")
 
 
 def test_the_end_halts_who_flies_while_traffic_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
