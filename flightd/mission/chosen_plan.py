@@ -37,11 +37,16 @@ class ChosenPlans:
         self._scanner = scanner
 
     def plan(
-        self, nodes: Sequence[str], levels: Sequence[int] = (), *, best_order: bool = False, waits: bool = False
+        self,
+        nodes: Sequence[str],
+        levels: Sequence[int] = (),
+        *,
+        best_order: bool = False,
+        waits: bool = False,
     ) -> FlightPlan:
-        """The plan over these nodes, each once, home or (`waits`) to hold at the last.  InputError, one line, for a node that the site lacks, that
-        no open line leads to or that a full battery does not reach and come back from, and for levels that
-        nothing is counted on."""
+        """The plan over these nodes, each once, home or (`waits`) to hold at the last.  InputError, one line,
+        for a node that the site lacks, that no open line leads to or that a full battery does not reach and
+        come back from, and for levels that nothing is counted on."""
         wanted = tuple(dict.fromkeys(nodes))
         self._check(wanted, levels)
         first = self._first

@@ -201,7 +201,8 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
 """Which phase a trigger begins, whatever the intent; `_begins` has what depends on that."""
 
 _FOR_VISITS = frozenset({Trigger.READY, Trigger.SCAN_DUE, Trigger.VIEW_DONE, Trigger.AWAITS_MORE})
-"""What leads on only where the plan is flown: nothing starts unordered, is scanned or waits on the way back."""
+"""What leads on only where the plan is flown: nothing starts unordered, is scanned or waits on the way
+back."""
 
 _OVER_PAD: Mapping[tuple[Trigger, Intent], tuple[Phase, Cause]] = {
     (Trigger.DOWN_TO_SWAP, Intent.RETURN): (Phase.SWAP, Cause.TRIGGER),

@@ -124,7 +124,7 @@ class ManagedDrone:
         self._return = SafeReturn()
         self._acting: asyncio.Task[None] | None = None
         self._did: tuple[Next, float, int] = (None, 0.0, 0)
-        """The last act, when, and the status by which it shows."""
+        """The last act, when it was answered, and the status by which it shows."""
         self._order: Order | None = None
         self._ahead: list[str] = []
         self._counts = ShelfCounts()
@@ -345,7 +345,6 @@ class ManagedDrone:
                     f"the drone was halted on its way to {act.towards}",
                 )
             elif act is not None and self._is_due(act, status, now_s):
-                self._did = act, now_s, status.seq + 2
                 self._acting = tasks.create_task(self._do(act, status, link), name=f"{self._name} is sent on")
 
     def _is_due(self, act: Next, status: StatusReport, now_s: float) -> bool:
@@ -411,6 +410,8 @@ class ManagedDrone:
             self._trouble = ErrorType.NODE_UNREACHABLE, refused
             if isinstance(err, RunError):
                 self._sent[text] -= 1
+        newest = status if self._status is None else self._status
+        self._did = act, asyncio.get_running_loop().time(), newest.seq + 2
         detail = ", ".join(act.nodes) if isinstance(act, PlanNext) else ""
         self._write_down(f"{text} {detail}".rstrip(), refused)
 

@@ -92,7 +92,8 @@ def _on_ground(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, 
 
 
 def _in_air(status: StatusReport, wish: Wish) -> Next:
-    goal, following = status.way[0], _following(status)
+    at_end = _is_at_end(status)
+    goal, following = status.way[0], "" if at_end else _following(status)
     if wish.lands and not wish.ahead and {*status.way} == {wish.last}:
         if status.waits_at:
             return CommandNext(CommandKind.GOTO, wish.last)  # home from there: onto its pad
@@ -104,7 +105,7 @@ def _in_air(status: StatusReport, wish: Wish) -> Next:
     else:
         return _off_way(status, wish, goal)
     ends = goal == wanted == status.waits_at
-    waits = status.phase is Phase.HOLD and _is_at_end(status)
+    waits = at_end and status.phase is Phase.HOLD
     if (following != wanted and not ends) or (waits and wish.works):  # it is to be visited once more
         return CommandNext(CommandKind.GOTO, wanted, waits=status.waits_at is not None)
     if wish.ahead or wish.works:
@@ -113,7 +114,7 @@ def _in_air(status: StatusReport, wish: Wish) -> Next:
 
 
 def _following(status: StatusReport) -> str:
-    """The node after its goal; empty where that is its pad."""
+    """The node after its goal; empty where only its pad is left."""
     return status.way[1] if len(status.way) > 2 else ""
 
 

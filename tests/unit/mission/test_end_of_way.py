@@ -8,7 +8,6 @@ import pytest
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
 from flightd.core.types import CommandKind, EventLevel, LandedState, Phase
-from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from tests.unit.mission import shelves
 from tests.unit.mission.driven import Flight
 from tests.unit.mission.states import PARAMS, flight_of, losing, start
@@ -130,8 +129,6 @@ def test_a_fresh_battery_flies_the_rest_and_waits_at_its_end() -> None:
 
 
 def test_who_has_counted_waits_over_the_node_not_before_the_shelf() -> None:
-    scanner: AnyScanner = NO_SCAN
-    assert scanner is NO_SCAN
     flight = flown("A2", scans=True)
     at = shelves.SITE.nodes["A2"]
     assert flight.inputs.pose is not None
