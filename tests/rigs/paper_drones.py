@@ -20,7 +20,7 @@ from flightd.adapters.ground_link.messages.published import (
     StatusReport,
     VehicleReport,
 )
-from flightd.core.errors import RunError
+from flightd.core.errors import FlightdError, RunError
 from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.ground.messages import Act, LinkState
 from flightd.sim.fleet.world import FleetDrone
@@ -67,6 +67,8 @@ class PaperDrone:
         self.on_person: Callable[[], None] = lambda: None
         self.heard = self.sees = True
         self.counts = self.never_starts = False
+        self.refuses: dict[CommandKind, FlightdError] = {}
+        """Commands that have no effect, and how that shows."""
         self.plan = ""
         self._plan_waits = False
         self._nodes: tuple[str, ...] = ()
@@ -119,6 +121,8 @@ class PaperDrone:
     async def act(self, act: Act, *, by_person: bool = True) -> Accepted:
         if by_person:
             self.on_person()
+        if act.command in self.refuses:
+            raise self.refuses[act.command]
         stays = self.never_starts and act.command is CommandKind.START
         if stays or act.command not in self._possible:
             raise RunError(f"{act.command} refused: not in phase {self.phase}")
@@ -233,7 +237,11 @@ class PaperDrone:
 
     def _event(self, name: str, text: str) -> None:
         seq = next(self._events_seq)
-        self._events.append(EventReport(1, "s", seq, seq, EventLevel.INFO, name, text))
+        self._events.append(EventReport(1, "s", seq, self._now_ns, EventLevel.INFO, name, text))
+
+    @property
+    def _now_ns(self) -> int:
+        return round(asyncio.get_running_loop().time() * 1e9)
 
     def ordered_elsewhere(self, command: str) -> None:
         """Somebody at another station commands it."""
@@ -257,7 +265,7 @@ class PaperDrone:
         landed = "in_air" if armed else "on_ground"
         vehicle = VehicleReport("GUIDED", armed, True, landed, 0.0, 0.0, 0.9, 12.0, 0.0, 0.0, "")
         return StatusReport(
-            version=1, session=f"{self.name} {self._session}", seq=next(self._seq), stamp_ns=1,
+            version=1, session=f"{self.name} {self._session}", seq=next(self._seq), stamp_ns=self._now_ns,
             phase=self.phase, reason="", node="", goal=self.way[0] if self.way else "", nodes_done=0,
             nodes_planned=0, height_m=self.truth.z_m, position=at, lines=(), lines_age_s=0.0, vehicle=vehicle,
             frames=0, frames_dropped=0, fps=30.0, latency_ms={}, link=LinkReport(0, 0, 0, 0, 0),

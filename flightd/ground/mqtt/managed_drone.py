@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import uuid
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -47,6 +47,7 @@ from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
 from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
 from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
+from flightd.ground.mqtt.sent_commands import SentCommands
 from flightd.ground.mqtt.shelf_counts import ShelfCounts, levels_of
 
 _LOG = logging.getLogger(__name__)
@@ -117,7 +118,7 @@ class ManagedDrone:
         """Messages that came faster than they were taken."""
         self._link: DroneLink | None = None
         self._taken = False
-        self._sent: Counter[str] = Counter()
+        self._sent = SentCommands()
         self._event_seq: int | None = None
         self._standing: Standing | None = None
         self._asked_at_s = -_ASK_AGAIN_S
@@ -211,11 +212,9 @@ class ManagedDrone:
         if event.name == "visited":
             self._counts.note_visit(event)
         is_command = event.name == "command" and event.level is EventLevel.INFO
-        if is_command and event.text.split(" ")[0] in _COMMANDS:
-            if self._sent[event.text]:
-                self._sent[event.text] -= 1
-            else:
-                self.taken_by_person()
+        is_command = is_command and event.text.split(" ")[0] in _COMMANDS
+        if is_command and not self._sent.take(event):
+            self.taken_by_person()
 
     # what goes on
 
@@ -386,7 +385,7 @@ class ManagedDrone:
             self._plans.append(act_id)
         else:
             text = f"{act.kind} {act.node}".rstrip()
-        self._sent[text] += 1
+        self._sent.note(text, status.stamp_ns)
         refused = ""
         try:
             if isinstance(act, PlanNext):
@@ -409,7 +408,7 @@ class ManagedDrone:
             refused = str(err).removeprefix("refused: ")
             self._trouble = ErrorType.NODE_UNREACHABLE, refused
             if isinstance(err, RunError):
-                self._sent[text] -= 1
+                self._sent.refused(text)
         newest = status if self._status is None else self._status
         self._did = act, asyncio.get_running_loop().time(), newest.seq + 2
         detail = ", ".join(act.nodes) if isinstance(act, PlanNext) else ""

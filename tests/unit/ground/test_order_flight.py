@@ -22,6 +22,7 @@ from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
 from flightd.ground.mqtt.reported_drone import takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
+from flightd.ground.mqtt.sent_commands import SentCommands
 from flightd.ground.mqtt.shelf_counts import counted_in_words
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
@@ -208,6 +209,20 @@ def test_a_command_that_is_not_the_managers_takes_the_drone_from_him() -> None:
     assert taken == [True]
     drone.taken_by_person(False)
     assert taken == [True, False]
+
+
+def test_a_command_is_the_managers_once_and_as_long_as_it_can_take_effect() -> None:
+    def pause(at_s: float) -> EventReport:
+        return EventReport(1, "s", 1, round(at_s * 1e9), EventLevel.INFO, "command", "pause")
+
+    sent = SentCommands()
+    sent.note("pause", 0)
+    assert [sent.take(pause(at_s)) for at_s in (9.0, 9.5)] == [True, False]
+    sent.note("pause", 0)
+    assert not sent.take(pause(11.0)), "it never arrived"
+    sent.note("pause", 20_000_000_000)
+    sent.refused("pause")
+    assert not sent.take(pause(21.0))
 
 
 class Link:

@@ -254,6 +254,24 @@ def test_a_pause_between_two_nodes_leaves_a_drone_to_traffic(monkeypatch: pytest
     fly(go, "b")
 
 
+def test_a_pause_that_never_arrived_hides_no_later_one_of_a_person(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        await on_way_to("B3", fleet)
+        b.refuses[CommandKind.PAUSE] = UnavailableError("no answer")
+        with monkeypatch.context() as patched:
+            patched.setattr(TrafficControl, "paused", lambda _: frozenset({"b"}))
+            await asyncio.sleep(1.0)
+        b.refuses.clear()
+        assert "pause" not in b.commands
+        await asyncio.sleep(12.0)
+        assert fleet.flown("b")
+        b.ordered_elsewhere("pause")
+        await until(lambda: not fleet.flown("b"), 5)
+
+    fly(go, "b", counts=True)
+
+
 def test_who_was_paused_as_traffic_failed_is_flown_on_by_the_new_one(monkeypatch: pytest.MonkeyPatch) -> None:
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
