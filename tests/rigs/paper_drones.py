@@ -176,7 +176,7 @@ class PaperDrone:
 
     def _fly_over(self, nodes: Sequence[str], *, waits: bool) -> None:
         home = self._home_from(nodes[-1])
-        self.way = [*nodes, *nodes[-1:] * waits, *home]
+        self.way = [*nodes, *([nodes[-1]] if waits else []), *home]
         self.waits, self._waits_before = waits, len(home)
 
     @property

@@ -34,6 +34,8 @@ _DOUBTS_M: Final = 3.0
 _SIGMAS: Final = 3.0
 _CALLED_OFF_EVERY_S: Final = 2.0
 _STARTS_WITHIN_S: Final = 60.0
+_REFUSES_S: Final = 5.0
+"""What keeps a drone from going on for so long is told to traffic."""
 _IN_AIR: Final = frozenset({*FLYING, Phase.LAND, Phase.RECOVER})
 _CLIMBS: Final = frozenset({Phase.TAKE_OFF, Phase.ACQUIRE})
 
@@ -61,6 +63,8 @@ class FleetDrone:
         self._done = 0
         self._orders: BaseOrders | None = None
         self._refused = ""
+        self._refuses_since_s: float | None = None
+        self._not_counted: dict[str, str] = {}
         self._paused = self._was_taken = False
         self._called_off_s = -math.inf
         self._stands_since_s = 0.0
@@ -81,6 +85,11 @@ class FleetDrone:
         if self.air.is_astray or self.air.is_believed is False:
             return False
         return status.phase not in FLYING or status.phase is Phase.RELOCATE or self._is_on_base(status)
+
+    @property
+    def refused(self) -> str:
+        """Why it does not fly on as it was released; empty where it does."""
+        return self._refused
 
     @property
     def why(self) -> str:
@@ -140,7 +149,8 @@ class FleetDrone:
         if self.waits and not self._base and not ready:
             charge = 0.0  # nobody sends it anywhere
         self.air.doubt_m = self._doubt_m(status)
-        return DroneReport(self.name, self._done, charge, self.air.doubt_m)
+        failed = dict(self._not_counted)
+        return DroneReport(self.name, self._done, charge, self.air.doubt_m, not_counted=failed)
 
     def _doubt_m(self, status: StatusReport | None) -> float:
         if status is None or status.phase in _CLIMBS or status.phase not in _IN_AIR:
@@ -153,8 +163,11 @@ class FleetDrone:
 
     def _see_done(self) -> None:
         while self._base and self._is_done(self._base[0]):
-            self._base.popleft()
+            step = self._base.popleft()
             self._done += 1
+            failure = self.drone.vehicle.failure_of(step.count)
+            if failure is not None:
+                self._not_counted[self._node_of(step)] = failure or "the count failed"
 
     def _is_done(self, step: _Step) -> bool:
         if step.action.act is Act.TAKE_OFF:
@@ -198,7 +211,8 @@ class FleetDrone:
     def begin(self) -> None:
         """Traffic flies it from now on, from where it rests; nothing of before is left."""
         self._base.clear()
-        self._done, self._orders, self._refused = 0, None, ""
+        self._done, self._orders, self._refused, self._refuses_since_s = 0, None, "", None
+        self._not_counted.clear()
         self.air.begin()
         self.drone.flies = self.drone.lands = False
         self.drone.has_more = True
@@ -221,7 +235,8 @@ class FleetDrone:
         if not self._base or not self.waits:
             self._stands_since_s = now_s
         elif now_s - self._stands_since_s >= _STARTS_WITHIN_S:
-            self._refused = "it does not start"
+            self._refused = f"it does not start: {self.drone.trouble}".removesuffix(": ")
+        self._see_refusal(now_s)
         self._base.extend(_Step(action) for action in released)
         if paused is not self._paused:
             self._pause(paused=paused)
@@ -229,6 +244,15 @@ class FleetDrone:
         lands = bool(self._base) and self._base[0].action.act is Act.LAND
         self.drone.lands = lands and not paused
         self.drone.flies = self._orders is not None and not paused
+
+    def _see_refusal(self, now_s: float) -> None:
+        """In the air; on the ground it may be ready a little later."""
+        if not self.drone.trouble or not self._base or self.waits:
+            self._refuses_since_s = None
+        elif self._refuses_since_s is None:
+            self._refuses_since_s = now_s
+        elif now_s - self._refuses_since_s >= _REFUSES_S:
+            self._refused = self.drone.trouble
 
     def _pause(self, *, paused: bool) -> None:
         self._paused = paused

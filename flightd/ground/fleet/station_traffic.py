@@ -69,10 +69,11 @@ class StationTraffic:
         """Once round."""
         for name, drone in self._drones.items():
             drone.look()
-            if name in self._flown and not drone.is_ours:
+            refused = drone.refused if name in self._flown else ""
+            if not drone.is_ours:
                 self._flown.discard(name)
             if name not in self._flown:
-                self._lead_back(name, drone, now_ms)
+                self._lead_back(name, drone, now_ms, refused)
         reports = [self._drones[name].report() for name in sorted(self._flown)]
         commands = self._dispatcher.step(now_ms, reports)
         doubting = {report.drone for report in reports if report.doubt_m > 0.0}
@@ -80,13 +81,13 @@ class StationTraffic:
             paused = name in commands.paused - doubting  # who looks for his place stands by himself
             self._drones[name].fly(commands.base.get(name, ()), now_ms / 1000, paused=paused)
 
-    def _lead_back(self, name: str, drone: FleetDrone, now_ms: int) -> None:
+    def _lead_back(self, name: str, drone: FleetDrone, now_ms: int, refused: str) -> None:
         """Keep others out of a drone's air until it rests, and then fly it again."""
         drone.close_air()
         air = drone.air.place, drone.air.closed, drone.air.doubt_m
         if self._airs.get(name) != air:
             self._airs[name] = air
-            self._dispatcher.withdraw(name, *air, now_ms)
+            self._dispatcher.withdraw(name, *air, now_ms, refused)
         drone.call_off(now_ms / 1000)
         drone.drone.may_go_home = self._control.is_clear(name, drone.way_home)
         rests_at = drone.rests_at

@@ -157,6 +157,12 @@ class ManagedDrone:
         return self._standing
 
     @property
+    def trouble(self) -> str:
+        """What keeps it from going on with its order, as long as it does: what it refuses, or is not sent
+        to."""
+        return self.vehicle.held_back if self._trouble is None else self._trouble[1]
+
+    @property
     def floor(self) -> FloorStatus | None:
         """The map that it flies by."""
         return None if self._welcome is None else self._welcome["floor"]
@@ -211,6 +217,10 @@ class ManagedDrone:
     def _take_event(self, event: EventReport) -> None:
         if event.name == "visited":
             self._counts.note_visit(event)
+        act = self._did[0]
+        if isinstance(act, CommandNext) and act.node and event.level is EventLevel.WARNING:
+            refused = event.name == "command" and event.text.startswith(f"{act.kind} {act.node} refused")
+            self._trouble = (ErrorType.NODE_UNREACHABLE, event.text) if refused else self._trouble
         is_command = event.name == "command" and event.level is EventLevel.INFO
         is_command = is_command and event.text.split(" ")[0] in _COMMANDS
         if is_command and not self._sent.take(event):
@@ -343,7 +353,9 @@ class ManagedDrone:
                     ErrorType.NODE_UNREACHABLE,
                     f"the drone was halted on its way to {act.towards}",
                 )
-            elif act is not None and self._is_due(act, status, now_s):
+            elif act is None:
+                self._trouble = None
+            elif self._is_due(act, status, now_s):
                 self._acting = tasks.create_task(self._do(act, status, link), name=f"{self._name} is sent on")
 
     def _is_due(self, act: Next, status: StatusReport, now_s: float) -> bool:
@@ -403,7 +415,7 @@ class ManagedDrone:
                 plan = self._planned[0] if act.kind is CommandKind.START and self._planned else ""
                 order = Act(act_id, act.kind, act.node, plan, status.session, status.stamp_ns, act.waits)
                 await link.act(order, by_person=False)
-            self._trouble = None
+            self._trouble = self._trouble if act == self._did[0] else None
         except FlightdError as err:
             refused = str(err).removeprefix("refused: ")
             self._trouble = ErrorType.NODE_UNREACHABLE, refused

@@ -10,17 +10,21 @@ from typing import Any, cast
 import pytest
 
 from flightd.adapters.ground_link.floor_status import floor_status
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.cells import CellSize
 from flightd.fleet.traffic.dispatcher import Dispatcher
 from flightd.fleet.traffic.traffic_control import TrafficControl
+from flightd.fleet.vda5050.parts import Action
+from flightd.fleet.vda5050.state import ActionStatus
 from flightd.fleet.vehicle.drone_factsheet import Measures
+from flightd.fleet.vehicle.signals import Progress
 from flightd.ground.fleet.fleet_floor import FleetFloor
 from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.hub import Hub
 from flightd.ground.messages import Act
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
+from flightd.ground.mqtt.shelf_counts import ShelfCounts
 from flightd.sim.fleet.judge import FleetJudge
 from flightd.site.site import Site
 from tests.rigs.event_loops import virtual
@@ -167,7 +171,7 @@ def test_who_is_silent_has_his_way_home_to_himself_until_he_is_heard() -> None:
         fleet.own.ask(["B2"], "c")
         await until(lambda: not fleet.flown("b"))
         await until(lambda: b.phase is Phase.HOLD, 60)
-        await asyncio.sleep(60.0)
+        await asyncio.sleep(20.0)
         assert (b.phase, b.way[0]) == (Phase.HOLD, "B3"), "nobody paused it at the end of its base"
         b.turn_home()
         await until(lambda: b.phase is Phase.DONE, 200)
@@ -406,6 +410,60 @@ def test_a_drone_that_counts_is_not_sent_on_before_its_count_is_over() -> None:
         await until(lambda: fleet.state["done"] == ["A2"], 10)
         await until(lambda: a.phase is Phase.DONE, 300)
         assert fleet.state["done"] == ["A2", "A3"]
+
+    fly(go, "a", counts=True)
+
+
+def test_what_a_drone_does_not_fly_to_because_it_would_not_come_home_is_told_and_it_comes_home() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B2", 100)
+        b.left_s = 9.0
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert fleet.state["not_done"] == {"B3": "b: the drone would not come home from B3; it holds before"}
+        assert "home" not in b.commands
+
+    fly(go, "b")
+
+
+def test_what_one_drone_refuses_is_done_by_another_one() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"])
+        await until(lambda: fleet.state["given"] == {"B3": "b"} and b.phase is Phase.TAKE_OFF, 100)
+        b.refuses[CommandKind.GOTO] = RunError("goto refused: a shelf has fallen over")
+        fleet.own.ask(["B2"], "b")
+        await until(lambda: not fleet.flown("b"), 60)
+        b.refuses.clear()
+        await until(lambda: b.phase is Phase.DONE and fleet.state["done"] == ["B3"], 300)
+
+    fly(go, "bc")
+
+
+def test_what_a_drone_refuses_that_alone_may_do_it_has_its_reason() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.TAKE_OFF, 100)
+        b.refuses[CommandKind.GOTO] = RunError("refused: a shelf has fallen over")
+        await until(lambda: not fleet.flown("b"), 60)
+        b.refuses.clear()
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert (fleet.state["open"], fleet.state["not_done"]) == ([], {"B3": "b: a shelf has fallen over"})
+
+    fly(go, "b")
+
+
+def test_a_count_that_fails_is_not_done_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(_: ShelfCounts, action: Action, *__: Any) -> Progress:
+        return Progress(action.action_id, ActionStatus.FAILED, "no front camera")
+
+    async def go(fleet: PaperFleet) -> None:
+        monkeypatch.setattr(ShelfCounts, "begin", fails)
+        fleet.own.ask(["A2"])
+        await until(lambda: fleet.drones["a"].phase is Phase.DONE, 200)
+        assert (fleet.state["done"], fleet.state["not_done"]) == ([], {"A2": "a: no front camera"})
 
     fly(go, "a", counts=True)
 
