@@ -43,11 +43,13 @@ _COUNTS_S = 6.0
 _LASTS_S = {Phase.TAKE_OFF: 3.0, Phase.HOVER: 1.0, Phase.LAND: 3.0, Phase.RECOVER: 3.0}
 
 
-def hall(drone: str, name: str = "hall") -> Site:
-    """Two aisles of three nodes between the spurs at their ends, as this drone knows it."""
+def hall(drone: str, name: str = "hall", pad: str = "") -> Site:
+    """Two aisles of three nodes between the spurs at their ends, as this drone knows it; its own `pad` may be
+    at another node."""
+    at = PADS | ({drone: pad} if pad else {})
     pads = [
         Pad("home" if each == drone else f"pad-{each}", node, 0.5, charge=each == drone)
-        for each, node in PADS.items()
+        for each, node in at.items()
     ]
     aisles = [
         Aisle(aisle, 0.0, y_m, _STEPS_M, shelf_distance_m=1.2, shelf_height_m=2.5)
@@ -72,7 +74,7 @@ class PaperDrone:
         self.plan = ""
         self._plan_waits = False
         self._nodes: tuple[str, ...] = ()
-        self._session = 0
+        self._session = self._now_ns = 0
         self._events: list[EventReport] = []
         self._events_seq = itertools.count(1)
         self._seq = itertools.count(1)
@@ -167,6 +169,7 @@ class PaperDrone:
         """Fly until cancelled."""
         while True:
             await asyncio.sleep(STEP_S)
+            self._now_ns += round(STEP_S * 1e9)
             self._fly()
             heard_s = 0.0 if self.heard else 10.0
             self._tell(self.name, "link", LinkState(True, heard_s, 1.0, 0, True, self.flies, ""))
@@ -238,10 +241,6 @@ class PaperDrone:
     def _event(self, name: str, text: str) -> None:
         seq = next(self._events_seq)
         self._events.append(EventReport(1, "s", seq, self._now_ns, EventLevel.INFO, name, text))
-
-    @property
-    def _now_ns(self) -> int:
-        return round(asyncio.get_running_loop().time() * 1e9)
 
     def ordered_elsewhere(self, command: str) -> None:
         """Somebody at another station commands it."""

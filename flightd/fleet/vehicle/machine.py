@@ -159,6 +159,11 @@ class Vehicle:
         return "" if self._commanded else self._errors.what(ErrorType.BASE_BEYOND_SAFE_RETURN)
 
     @property
+    def is_paused(self) -> bool:
+        """Whether it was told to stand until it may go on."""
+        return self._instant.pauses
+
+    @property
     def is_idle(self) -> bool:
         """Whether no order is left to be flown or done."""
         return self._idle

@@ -3,12 +3,14 @@ what is released to it becomes an order, and what it tells becomes actions that 
 
 from __future__ import annotations
 
+import logging
 import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.dispatcher import DroneReport
@@ -21,9 +23,11 @@ from flightd.ground.fleet.drone_air import DroneAir
 from flightd.ground.fleet.fleet_floor import FleetFloor
 from flightd.ground.mqtt.managed_drone import ManagedDrone
 from flightd.ground.mqtt.order_flight import WAITS
+from flightd.ground.mqtt.safe_return import Standing
 from flightd.mission.machine import FLYING
 from flightd.site.site import Side
 
+_LOG = logging.getLogger(__name__)
 RESERVE: Final = 0.15
 FLIGHT_S: Final = 3600.0
 """The charge that traffic is told is the time that the drone itself expects to have left, in such flights."""
@@ -65,7 +69,10 @@ class FleetDrone:
         self._refused = ""
         self._refuses_since_s: float | None = None
         self._not_counted: dict[str, str] = {}
-        self._paused = self._was_taken = False
+        self._checked: tuple[FloorStatus | None, Standing | None] = None, None
+        self.objection = ""
+        """Why it is not flown on this floor, by its map and where it stands."""
+        self._paused, self._was_taken = drone.vehicle.is_paused, False
         self._called_off_s = -math.inf
         self._stands_since_s = 0.0
         self.air = DroneAir(name, floor)
@@ -82,7 +89,7 @@ class FleetDrone:
         status = self.drone.status
         if status is None or not self.drone.is_heard or not self.drone.is_automatic or self._refused:
             return False
-        if self.air.is_astray or self.air.is_believed is False:
+        if self.objection or self.air.is_astray or self.air.is_believed is False:
             return False
         return status.phase not in FLYING or status.phase is Phase.RELOCATE or self._is_on_base(status)
 
@@ -97,8 +104,8 @@ class FleetDrone:
         status, floor = self.drone.status, self.drone.floor
         if status is None or floor is None or not self.drone.is_heard:
             return "it is not heard"
-        if not self._floor.is_of(floor):
-            return f"it flies by another map: {floor.name}"
+        if self.objection:
+            return self.objection
         if self.air.is_astray:
             return "nothing shows that it stands on its pad; give it back once it does"
         if self.drone.is_taken or self.air.is_believed is False:
@@ -120,11 +127,15 @@ class FleetDrone:
         return status is not None and status.phase is Phase.PREFLIGHT and self.drone.is_automatic
 
     @property
+    def stands(self) -> bool:
+        """It waits on its pad, and has told where that is."""
+        return self.drone.is_heard and self.waits and self.air.rests and self.drone.standing is not None
+
+    @property
     def rests_at(self) -> int | None:
         """The vertex from which traffic may fly it on: it waits on its pad, or holds over a node."""
-        status, floor = self.drone.status, self.drone.floor
-        fits = floor is not None and self._floor.is_of(floor)
-        if status is None or not fits or not self.drone.is_heard or not self.drone.is_automatic:
+        status = self.drone.status
+        if status is None or self.objection or not self.drone.is_heard or not self.drone.is_automatic:
             return None
         if self.waits:
             return self._floor.pad(self.name) if self.air.rests else None
@@ -188,6 +199,32 @@ class FleetDrone:
         if self.air.is_astray and not was_astray:
             drone.taken_by_person()  # it lies where it is until he gives it back
         self._was_taken = drone.is_taken
+        self._check()
+
+    def _check(self) -> None:
+        """Its map and pad, whenever it may have others: after each start of its daemon."""
+        told = self.drone.floor, self.drone.standing
+        floor, standing = told
+        if floor is None or (floor is self._checked[0] and standing is self._checked[1]):
+            return
+        self._checked = told
+        stands_on = None if standing is None else standing.node
+        before, self.objection = self.objection, self._floor.objection(self.name, floor, stands_on)
+        if self.objection and self.objection != before:
+            _LOG.warning("%s is not flown: %s", self.name, self.objection)
+
+    @property
+    def closed_air(self) -> tuple[int, frozenset[int], float]:
+        """A place of it, what it may be on, and by how much beside: near its own pad and another one that it
+        tells."""
+        air, floor = self.air, self.drone.floor
+        if not self.objection or floor is None or not self._floor.is_of(floor):
+            return air.place, air.closed, air.doubt_m
+        over, beside_m = self._floor.beside(floor)
+        stands = (
+            () if self.drone.standing is None else self._floor.way(self.name, (self.drone.standing.node,))
+        )
+        return air.place, air.closed.union([over], stands), max(air.doubt_m, beside_m)
 
     def close_air(self) -> None:
         """Traffic does not fly it: it may be on all that it was released to, ordered, or tells, and near."""

@@ -91,6 +91,24 @@ class FleetFloor:
         """Whether a drone's map is this floor, but for pads."""
         return _without_pads(floor) == self._like
 
+    def objection(self, drone: str, floor: FloorStatus, stands_on: str | None) -> str:
+        """Why a drone that flies by its map `floor`, and stands beside that node, is not flown on this one;
+        empty where it is."""
+        if not self.is_of(floor):
+            return f"it flies by another map: {floor.name}"
+        try:
+            pad = own_pad(drone, floor, floor.home if stands_on is None else stands_on)
+        except InputError as err:
+            return str(err)
+        return "" if pad == self.pads[drone] else f"it has another pad than before: at {pad.node}"
+
+    def beside(self, floor: FloorStatus) -> tuple[int, float]:
+        """The vertex over the node that is nearest to the pad which a map calls home, and how far that is."""
+        homes = [pad for pad in floor.pads if node_of_pad(floor, pad) == floor.home]
+        at = (homes[0].x_m, homes[0].y_m) if homes else (0.0, 0.0)
+        nearest = self._nearest(at)
+        return self.lanes.over(nearest.node), math.dist((nearest.x_m, nearest.y_m), at)
+
     def pad(self, drone: str) -> int:
         """The vertex on a drone's pad."""
         return self.lanes.index[f"{_TO_PAD}{drone}"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import uuid
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
@@ -13,6 +14,7 @@ from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.types import CommandKind
 from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.work_queue import WorkQueue
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.fleet.base_orders import VERSION
@@ -31,6 +33,8 @@ TRAFFIC: Final = Identity("fleet traffic", Role.OPERATOR, "local")
 _LOG = logging.getLogger(__name__)
 _STEP_S: Final = 0.25
 _AGAIN_S: Final = 5.0
+_FAILS_AGAIN_S: Final = 60.0
+"""If traffic fails so soon after it failed before, it does so over the work that waits."""
 
 
 class OwnFleet(VehicleSides):
@@ -44,6 +48,10 @@ class OwnFleet(VehicleSides):
             drone.at_broker = True  # who gives the orders is always there
         self._fleet: tuple[FleetFloor, dict[str, FleetDrone], Pace] | None = None
         self._traffic: StationTraffic | None = None
+        self._queue = WorkQueue(())
+        self._failed_s = -math.inf
+        self._compared: dict[str, FloorStatus] = {}
+        """The maps by which it was last tried to fly them."""
         self._trouble = ""
         self._hub: Hub | None = None
 
@@ -85,10 +93,15 @@ class OwnFleet(VehicleSides):
                 if self._traffic is None:
                     self._assemble()
                 else:
+                    if self._traffic.is_outdated and self._is_told_anew:
+                        self._compare()
                     self._traffic.step(int(loop.time() * 1000))
             except Exception as err:  # noqa: BLE001 - the station goes on; nobody is released to more
                 _LOG.error("the traffic of the fleet failed, and begins anew", exc_info=True)
                 self._traffic, self._trouble = None, f"it failed: {err}"
+                if loop.time() - self._failed_s < _FAILS_AGAIN_S:
+                    self._queue.hand_back([*self._queue.given, *self._queue.open], "traffic failed over it")
+                self._failed_s = loop.time()
                 for drone in self._drones.values():
                     drone.may_go_home = False  # nobody knows who is in its way
                 await asyncio.sleep(_AGAIN_S)
@@ -98,8 +111,20 @@ class OwnFleet(VehicleSides):
         """Once every drone has told its map and where it stands: nobody flies before, for each may be
         anywhere.  Where each may be is known on when traffic has failed."""
         if self._fleet is not None:
-            self._traffic, self._trouble = StationTraffic(*self._fleet, self._cell), ""
-            return
+            self._begin()
+        else:
+            self._compare()
+
+    def _begin(self) -> None:
+        assert self._fleet is not None
+        self._traffic, self._trouble = StationTraffic(*self._fleet, self._cell, self._queue), ""
+
+    @property
+    def _is_told_anew(self) -> bool:
+        return any(drone.floor is not self._compared.get(name) for name, drone in self._drones.items())
+
+    def _compare(self) -> None:
+        """Fly them by their maps and pads as they are told now; as before where that cannot be."""
         floors: dict[str, FloorStatus] = {}
         standings: dict[str, Standing] = {}
         for name, drone in self._drones.items():
@@ -108,21 +133,23 @@ class OwnFleet(VehicleSides):
         if missing := [name for name in self._drones if name not in floors]:
             self._trouble = f"{', '.join(missing)} did not tell yet where it stands on the ground"
             return
+        self._compared = floors
         stands = {name: standing.node for name, standing in standings.items()}
         try:
             floor = FleetFloor(floors, stands, self._cell)
         except InputError as err:
             if self._trouble != str(err):
-                _LOG.warning("the fleet does not fly: %s", err)
+                _LOG.warning(
+                    "the fleet %s: %s", "does not fly" if self._traffic is None else "flies on as before", err
+                )
             self._trouble = str(err)
             return
-        self._trouble = ""
         drones = {
             name: FleetDrone(name, drone, floor, self._cell.uncertainty_m)
             for name, drone in self._drones.items()
         }
         self._fleet = floor, drones, pace_of(standings.values())
-        self._traffic = StationTraffic(*self._fleet, self._cell)
+        self._begin()
 
     # what is asked of it
 
@@ -138,7 +165,13 @@ class OwnFleet(VehicleSides):
     def document(self) -> dict[str, Any]:
         """How it is, as JSON has it."""
         told = {} if self._traffic is None else self._traffic.document()
-        return {"flies": self._traffic is not None, "trouble": self._trouble, **told}
+        work = {
+            "open": list(self._queue.open),
+            "given": dict(self._queue.given),
+            "done": list(self._queue.done),
+            "not_done": dict(self._queue.reasons),
+        }
+        return {"flies": self._traffic is not None, "trouble": self._trouble, **told, **work}
 
 
 async def stop_all(hub: Hub) -> dict[str, str]:

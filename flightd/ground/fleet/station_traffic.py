@@ -33,21 +33,37 @@ def pace_of(standings: Iterable[Standing]) -> Pace:
 
 
 class StationTraffic:
-    """`step` it often.  It takes the drones one by one, where each rests."""
+    """`step` it often.  It takes the drones one by one, where each rests; what the `queue` has given before
+    waits again."""
 
     def __init__(
-        self, floor: FleetFloor, drones: Mapping[str, FleetDrone], pace: Pace, cell: CellSize
+        self,
+        floor: FleetFloor,
+        drones: Mapping[str, FleetDrone],
+        pace: Pace,
+        cell: CellSize,
+        queue: WorkQueue,
     ) -> None:
         self._floor = floor
         self._drones = drones
         self._control = TrafficControl(floor.lanes, pace, cell)
-        self._queue = WorkQueue(())
+        self._queue = queue
+        queue.hand_back([*queue.given])
+        gone = [node for node in queue.open if node not in floor.lanes.column_of]
+        queue.hand_back(gone, "the drones' map has it no more")
         self._dispatcher = Dispatcher(self._control, self._queue, _ENDURANCE, shares=True)
         self._dwell_ms = int(pace.dwell_s * 1000)
         self._flown: set[str] = set()
         self._airs: dict[str, tuple[int, frozenset[int], float]] = {}
         for name in drones:
             self._control.enter(name, floor.pad(name))
+
+    @property
+    def is_outdated(self) -> bool:
+        """A drone has another map or pad than before, and all rest: who was told what it flies by begins
+        anew."""
+        drones = self._drones.values()
+        return any(drone.objection for drone in drones) and all(drone.stands for drone in drones)
 
     @property
     def flown(self) -> frozenset[str]:
@@ -84,7 +100,7 @@ class StationTraffic:
     def _lead_back(self, name: str, drone: FleetDrone, now_ms: int, refused: str) -> None:
         """Keep others out of a drone's air until it rests, and then fly it again."""
         drone.close_air()
-        air = drone.air.place, drone.air.closed, drone.air.doubt_m
+        air = drone.closed_air
         if self._airs.get(name) != air:
             self._airs[name] = air
             self._dispatcher.withdraw(name, *air, now_ms, refused)
@@ -110,8 +126,4 @@ class StationTraffic:
                 }
                 for name, course in self._control.drones.items()
             },
-            "open": list(self._queue.open),
-            "given": dict(self._queue.given),
-            "done": list(self._queue.done),
-            "not_done": dict(self._queue.reasons),
         }

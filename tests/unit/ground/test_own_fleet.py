@@ -395,9 +395,26 @@ def test_where_traffic_fails_everybody_ends_his_base_and_is_brought_home_anew(
             await until(lambda: not fleet.state["flies"])
             assert fleet.state["trouble"] == "it failed: division by zero"
             await until(lambda: a.phase is Phase.HOLD and b.phase is Phase.HOLD)
+            assert (fleet.state["given"], fleet.state["done"]) == ({"A3": "a", "B3": "b"}, [])
         await until(lambda: a.phase is Phase.DONE and b.phase is Phase.DONE, 300)
+        assert set(fleet.state["open"]) == {"A3", "B3"}, "the work is kept"
+        await asyncio.sleep(1.0)
+        a.begin_anew()
+        await until(lambda: set(fleet.state["done"]) == {"A3", "B3"}, 300)
 
     fly(go, "ab")
+
+
+def test_work_over_which_traffic_fails_again_and_again_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        fleet.own.ask(["A3"])
+        monkeypatch.setattr(Dispatcher, "_give_tour", lambda *_: 1 / 0)
+        await until(lambda: fleet.state["not_done"] == {"A3": "traffic failed over it"}, 20)
+        await until(lambda: fleet.state["flies"], 20)
+        await asyncio.sleep(10.0)
+        assert fleet.state["flies"]
+
+    fly(go, "a")
 
 
 def test_a_drone_that_counts_is_not_sent_on_before_its_count_is_over() -> None:
@@ -488,6 +505,44 @@ def test_a_drone_with_little_left_is_sent_nowhere() -> None:
         assert (fleet.state["open"], fleet.drones["a"].commands) == (["A2"], [])
 
     fly(go, "a")
+
+
+def test_who_has_another_pad_after_a_start_is_flown_once_all_rest_and_round_it_until_then() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, c = fleet.drones["a"], fleet.drones["c"]
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: a.phase is Phase.FOLLOW, 100)
+        c.site = hall("c", pad="A5")
+        c.begin_anew()
+        await until(lambda: not fleet.flown("c"))
+        assert fleet.state["drones"]["c"]["why"] == "it has another pad than before: at A5"
+        fleet.own.ask(["A4"], "a")
+        fleet.own.ask(["B4"], "c")
+        await until(lambda: a.phase is Phase.DONE, 200)
+        assert fleet.state["done"] == ["A3"], "it stands beside A4"
+        await asyncio.sleep(1.0)
+        a.begin_anew()
+        await until(lambda: fleet.flown("c"), 20)
+        await until(lambda: "B4" in fleet.state["done"] and c.phase is Phase.DONE, 300)
+        assert c.truth.x_m == c.site.nodes["A5"].x_m
+
+    fly(go, "ac")
+
+
+def test_who_flies_by_another_map_after_a_start_is_not_flown_and_the_others_are() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        c = fleet.drones["c"]
+        c.site = hall("c", "shed")
+        c.begin_anew()
+        await until(lambda: fleet.state["drones"]["c"]["why"] == "it flies by another map: shed")
+        await until(lambda: fleet.state["trouble"] != "")
+        fleet.own.ask(["A3"])
+        await until(lambda: fleet.state["done"] == ["A3"], 200)
+        c.site = hall("c")
+        c.begin_anew()
+        await until(lambda: fleet.flown("c"))
+
+    fly(go, "ac")
 
 
 def test_nodes_and_drones_that_are_not_there_are_refused() -> None:
