@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import pytest
 
@@ -30,6 +30,7 @@ from flightd.site.site import Site
 from tests.rigs.event_loops import virtual
 from tests.rigs.paper_drones import STEP_S, PaperDrone, hall
 
+T = TypeVar("T")
 BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
 
 
@@ -47,10 +48,21 @@ class PaperFleet:
 
     def __init__(self, sites: Mapping[str, Site], hold_s: float = 20.0) -> None:
         self.written: list[tuple[str, str, str, str]] = []
-        self.own = OwnFleet(sites, BODY, OrderRules(hold_s, lambda *line: self.written.append(line)))
+        self.own = OwnFleet(
+            sites, BODY, OrderRules(hold_s, lambda *line: self.written.append(line)), self.aside
+        )
+        self.deciding: asyncio.Event | None = None
+        """What is decided comes no sooner."""
         self.pages: dict[tuple[str, str], Any] = {}
         self.drones = {name: PaperDrone(name, site, self.own.tell) for name, site in sites.items()}
         self.judge = FleetJudge(CellSize(upright_m=100.0), 0.0)
+
+    async def aside(self, work: Callable[[], T]) -> T:
+        """At once, and what comes of it when a test wants it."""
+        found = work()
+        if self.deciding is not None:
+            await self.deciding.wait()
+        return found
 
     def tell(self, drone: str, topic: str, value: Any) -> None:
         """As the hub tells its pages."""
@@ -366,6 +378,28 @@ def test_an_error_about_one_drone_ends_no_other_one(monkeypatch: pytest.MonkeyPa
         await until(lambda: fleet.flown("a") and fleet.flown("b"))
         fleet.own.ask(["A2"], "a")
         await until(lambda: fleet.state["done"] == ["A2"], 200)
+
+    fly(go, "ab")
+
+
+def test_what_was_decided_while_a_person_took_a_drone_is_not_flown_by_it() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        fleet.deciding = asyncio.Event()
+        await asyncio.sleep(1.0)
+        fleet.own.ask(["B3"], "b")
+        fleet.own.ask(["A2"], "a")
+        assert fleet.state["open"] == ["B3", "A2"], "it was asked for while something is decided"
+        fleet.deciding.set()
+        fleet.deciding = asyncio.Event()
+        await until(lambda: set(fleet.state["given"]) == {"A2", "B3"})
+        fleet.own.hand_over("b", to_manager=False)
+        await asyncio.sleep(5.0)
+        assert (a.commands, b.commands, fleet.flown("b")) == ([], [], True), "it is as it was before"
+        fleet.deciding.set()
+        fleet.deciding = None
+        await until(lambda: fleet.state["done"] == ["A2"], 200)
+        assert (b.commands, fleet.flown("b"), fleet.state["open"]) == ([], False, ["B3"])
 
     fly(go, "ab")
 
