@@ -67,7 +67,7 @@ class Commands:
 
 class Dispatcher:
     """The fleet of one floor.  With `shares` no drone is given more than its part of what waits, for all that
-    could fly now."""
+    could fly now, and a step plans one tour at most: the next one follows soon."""
 
     def __init__(
         self, control: TrafficControl, queue: WorkQueue, endurance: Endurance, *, shares: bool = False
@@ -322,10 +322,14 @@ class Dispatcher:
     def _give_tours(self, now_ms: int) -> None:
         ready = [drone for drone in self.control.drones if self._may_begin(drone)]
         for i, drone in enumerate(ready):
-            due = self.queue.open and now_ms >= self._next_try_ms.get(drone, 0)
+            if not self.queue.open or now_ms < self._next_try_ms.get(drone, 0):
+                continue
             most = math.ceil(len(self.queue.open) / (len(ready) - i)) if self._shares else MOST_OF_TOUR
-            if due and not self._give_tour(drone, now_ms, min(most, MOST_OF_TOUR)):
+            plans = self.control.replans
+            if not self._give_tour(drone, now_ms, min(most, MOST_OF_TOUR)):
                 self._next_try_ms[drone] = now_ms + _RETRY_MS
+            if self._shares and self.control.replans > plans:
+                return
 
     def _may_begin(self, drone: str) -> bool:
         """Whether a drone has nothing to do, and a battery to do something."""
