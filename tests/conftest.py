@@ -1,6 +1,6 @@
 """For all tests: Hypothesis repeats its examples, and no test depends on the machine's speed.
 
-Those marked `realtime` do depend on it: see `tests.rigs.machine`."""
+Those marked `realtime` do depend on it: see `tests.rigs.machine`; those in a browser may."""
 
 from __future__ import annotations
 
@@ -66,7 +66,11 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whole flights first, and spread among them what needs a browser: a flight computes, a page mostly
     waits, and one that began last would keep one core busy while the other waits.  Of those by the clock come
-    last what needs little of the machine: they are short."""
+    last what needs little of the machine: they are short.  What the machine's speed may make fail, by the
+    clock or in a browser, is tried once more, and told."""
+    for item in items:
+        if _cores_of(item) or _IN_BROWSER.match(item.nodeid):
+            item.add_marker(pytest.mark.flaky(reruns=1))
     flights = [item for item in items if "/sim/" in item.nodeid]
     flights.sort(key=lambda item: item.get_closest_marker("slow") is None)
     turn = {item.nodeid: number / len(flights) for number, item in enumerate(flights)}

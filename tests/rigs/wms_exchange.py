@@ -12,10 +12,10 @@ import pytest
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.inventory import LocationState, Observation, PlannedLocation, Standing
 from flightd.core.types import CodeRead
+from flightd.ground import shared_folder
 from flightd.ground.expected_stock_book import ExpectedStock, ExpectedStockBook
 from flightd.ground.ground_store.batch import Batch, SentLook
 from flightd.ground.ground_store.store import GroundStore
-from flightd.ground.wms_exchange import drop_folder
 from flightd.ground.wms_exchange.exchange import Exchange, Exchanged
 from flightd.ground.wms_exchange.exchange_file import load_exchange
 
@@ -106,13 +106,13 @@ class CutFiles:
 
 def cut_exchanges(monkeypatch: pytest.MonkeyPatch) -> Cuts:
     """Of every file system and every transaction of an exchange from now on."""
-    cuts, opened = Cuts(), drop_folder.file_system
+    cuts, opened = Cuts(), shared_folder.file_system
 
-    def cut_files(address: str, file: Path, key: str) -> tuple[Any, str]:
-        files, path = opened(address, file, key)
+    def cut_files(address: str, file: Path | str, key: str, what: str) -> tuple[Any, str]:
+        files, path = opened(address, file, key, what)
         return CutFiles(files, cuts), path
 
-    monkeypatch.setattr(drop_folder, "file_system", cut_files)
+    monkeypatch.setattr(shared_folder, "file_system", cut_files)
     for kind, name in (
         (GroundStore, "next_file"), (GroundStore, "file_lies_there"), (ExpectedStockBook, "keep"),
         (ExpectedStockBook, "moved"),

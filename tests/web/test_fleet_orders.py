@@ -124,6 +124,7 @@ def test_a_manager_flies_a_drone_until_a_person_stops_it(tmp_path: Path) -> None
         await until(lambda: flight.x_m > between, 60)
         await master.instant("startPause")
         await until(lambda: master.last("state")["paused"] and flight.phase is Phase.HOLD, 60)
+        await until(lambda: not master.last("state")["driving"], 60)
         assert (master.ahead, master.last("state")["lastNodeId"]) == ("A5 A6", "A4")
         paused = len(master.of("state"))
         await master.instant("stopPause")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
@@ -24,11 +23,12 @@ Store: TypeAlias = Annotated[
     ),
 ]
 Pictures: TypeAlias = Annotated[
-    Path | None,
+    str | None,
     typer.Option(
         "--evidence",
-        metavar="DIR",
-        help="Where the store's pictures lie.  Default: FILE-evidence; in PostgreSQL there is none.",
+        metavar="DIR|URL",
+        help="Where the store's pictures lie: a folder, or sftp://USER@HOST/FOLDER, s3://BUCKET/FOLDER."
+        "  Default: FILE-evidence; with PostgreSQL there is none.",
         show_default=False,
     ),
 ]
@@ -48,7 +48,7 @@ StoreOrStation: TypeAlias = Annotated[
 
 
 @contextmanager
-def target(store: str, evidence: Path | None) -> Iterator[Target]:
+def target(store: str, evidence: str | None) -> Iterator[Target]:
     """A store that is opened meanwhile, or a station.  Errors as `opened` and `StationTarget`."""
     if store.startswith(("http://", "https://")):
         from flightd.ground.ground_store.station_target import StationTarget
@@ -59,7 +59,7 @@ def target(store: str, evidence: Path | None) -> Iterator[Target]:
         yield found
 
 
-def opened(store: str, evidence: Path | None) -> GroundStore:
+def opened(store: str, evidence: str | None) -> GroundStore:
     """InputError, UnavailableError as `opened_store`."""
     try:
         from flightd.ground.ground_store.open_store import opened_store

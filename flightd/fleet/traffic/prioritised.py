@@ -27,9 +27,9 @@ _RAISED_AT_MOST: Final = 4
 _START: Final = "start of "
 """Before the name of a drone: the holder of the air in which it stands until it is planned."""
 WEIGHT: Final = 2.0
-"""Of the estimate against the time flown (bounded-suboptimal SIPP, K. Yakovlev et al. 2020): a leg takes at
-most so much longer than the shortest one that stops in no section but those of its ends, and is found much
-sooner where many drones have to wait."""
+"""Of the estimate against the time flown (bounded-suboptimal SIPP, K. Yakovlev et al. 2020): a leg that is
+found before its search is hurried (`sipp.PATIENT_STATES`) takes at most so much longer than the shortest one
+that stops in no section but those of its ends."""
 STATES_FOR_ONE: Final = 20_000
 """States that the search for one drone may expand."""
 

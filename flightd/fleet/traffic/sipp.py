@@ -5,7 +5,7 @@ drone at cruising speed cannot wait, so that an early arrival there is not bette
 states keep the interval of all their possible arrivals, as in Z. Ali and K. Yakovlev, "Safe Interval Path
 Planning with Kinodynamic Constraints" (SIPP-IP), AAAI 2023.  Both together are complete and optimal over
 the motions.  With a weight above 1, sections of aisles in which the drone neither begins nor ends are flown
-through without a stop, unless there is no other way.
+through without a stop, unless there is no other way, and a search that takes long is hurried.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import heapq
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 from flightd.fleet.traffic.distances import Distances
 from flightd.fleet.traffic.motions import NEVER, Act, Motion, MotionNet, Part
@@ -22,6 +22,12 @@ from flightd.fleet.traffic.plan import Action, Stop, actions_of
 from flightd.fleet.traffic.reservations import FREE_FROM, ReservationTable
 from flightd.fleet.traffic.sections import NONE
 from flightd.fleet.traffic.steps import Step, StepTable, Sweep
+
+PATIENT_STATES: Final = 200
+"""A search with a weight above 1 that has looked at so many states is hurried: by far the most are over
+before, and those that are not would take three quarters of the time of all."""
+HURRIED: Final = 32.0
+"""The weight from then on: nearly whatever is nearest to the goal is looked at first."""
 
 _Window: TypeAlias = tuple[int, int]
 """From and to, milliseconds; both ends belong to it."""
@@ -133,6 +139,8 @@ class _Search:
         self._kept: dict[int, Sequence[Step]] = {}
         self._covered: dict[int, tuple[list[int], list[int]]] = {}
         self._guide = guide
+        self._weight = guide.weight
+        self._looked_at = 0
 
     def run(self, configuration: int, at_ms: int, done: set[int]) -> Iterator[Leg]:
         """Legs that end in safe intervals whose ends are not in `done`, and are then."""
@@ -156,10 +164,24 @@ class _Search:
             if effort.spent >= effort.most:
                 return
             effort.spent += 1
+            self._looked_at += 1
+            if self._looked_at == PATIENT_STATES and self._weight > 1.0:
+                self._hurry()
             states.append(state)
             if here >> 3 == goal_vertex and not here & 1:
                 self._finish(here, low, high)
             self._expand(here, low, high)
+
+    def _hurry(self) -> None:
+        """Go on with a heavier weight, from the states that are there."""
+        heavier = HURRIED / self._weight
+        self._weight = HURRIED
+        waiting = [
+            state if state[3] < 0 else (state[4] + (state[0] - state[4]) * heavier, *state[1:])
+            for state in self._queue
+        ]
+        heapq.heapify(waiting)
+        self._queue[:] = waiting
 
     def _safe_until(self, vertex: int, at_ms: int) -> int:
         """The end of the safe interval around a time, -1 where there is none."""
@@ -185,7 +207,7 @@ class _Search:
     def _expand(self, here: int, low: int, high: int) -> None:
         """Every safe arrival by the motions that begin here between `low` and `high`."""
         best, queue, guide = self._best, self._queue, self._guide
-        weight = guide.weight
+        weight = self._weight
         before = len(self._states) - 1
         for target, vertex, duration_ms, sweeps, motion in self._steps(here):
             if guide.moving_ms[vertex] >= NEVER:

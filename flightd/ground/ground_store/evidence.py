@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Protocol
 
 from flightd.adapters.store.evidence_pictures import EvidenceFolder
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.plain_files import plain_file
-from flightd.vision.shelf.evidence_jpeg import MOST_BYTES
+from flightd.ground.shared_folder import SharedFolder
+from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, picture_name
 
 
 class Evidence(Protocol):
@@ -46,6 +47,38 @@ class FolderEvidence:
         return jpeg
 
 
+class SharedEvidence:
+    """In a bucket or on another machine, wherever fsspec reaches."""
+
+    def __init__(self, url: str) -> None:
+        """InputError, UnavailableError as `SharedFolder`."""
+        self._folder = SharedFolder(url, "", "--evidence", what="--evidence URL", make=True)
+
+    def has(self, name: str) -> bool:
+        return self._folder.has(_at(name))
+
+    def keep(self, jpeg: bytes) -> str:
+        if len(jpeg) > MOST_BYTES:
+            raise ValueError(f"evidence of {len(jpeg)} bytes; at most {MOST_BYTES} are kept")
+        name = picture_name(jpeg)
+        if not self.has(name):
+            self._folder.write(_at(name), jpeg)
+        return name
+
+    def picture(self, name: str) -> bytes:
+        """UnavailableError, too, for one that is not what its name says."""
+        if not self.has(name):
+            raise InputError("this picture was not kept")
+        jpeg = self._folder.read(_at(name), MOST_BYTES)
+        if picture_name(jpeg) != name:
+            raise UnavailableError("the picture is damaged", file=f"{self._folder.address}/{_at(name)}")
+        return jpeg
+
+
+def _at(name: str) -> str:
+    return f"{checked(name)[:2]}/{name}.jpg"
+
+
 class NoEvidence:
     """Where nobody said where pictures are to lie: fine as long as there are none."""
 
@@ -60,7 +93,7 @@ class NoEvidence:
 
 
 def _untold(what: str) -> InputError:
-    return InputError(f"{what}: the store has no place for it", remedy="say where: --evidence DIR")
+    return InputError(f"{what}: the store has no place for it", remedy="say where: --evidence DIR|URL")
 
 
 def checked(name: str) -> str:

@@ -7,21 +7,21 @@ from pathlib import Path
 from flightd.core.errors import InputError
 from flightd.core.extras import missing_extra
 from flightd.ground.ground_store.engine import Engine
-from flightd.ground.ground_store.evidence import FolderEvidence, NoEvidence
+from flightd.ground.ground_store.evidence import Evidence, FolderEvidence, NoEvidence, SharedEvidence
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
 
 _POSTGRES = ("postgresql://", "postgres://")
 
 
-def opened_store(address: str, evidence: Path | None = None) -> GroundStore:
-    """Made where it is not there yet.  Pictures lie in `evidence`, unless given `FILE-evidence` beside a
-    file's store.
+def opened_store(address: str, evidence: str | None = None) -> GroundStore:
+    """Made where it is not there yet.  Pictures lie in `evidence`, a folder or a URL that fsspec knows;
+    unless that is given, in `FILE-evidence` beside a file's store.
 
     InputError for an address or a store that is none, or is newer, UnavailableError where it cannot be
     had."""
     if address.startswith(_POSTGRES):
-        return GroundStore(_postgres(address), NoEvidence() if evidence is None else FolderEvidence(evidence))
+        return GroundStore(_postgres(address), NoEvidence() if evidence is None else _evidence(evidence))
     if "://" in address:
         raise InputError(
             "neither a file nor a URL of PostgreSQL",
@@ -31,8 +31,12 @@ def opened_store(address: str, evidence: Path | None = None) -> GroundStore:
     file = Path(address)
     if file.is_dir():
         raise InputError("is a folder", key=f"--store {address}", remedy="give a file in it")
-    beside = file.with_name(f"{file.name}-evidence") if evidence is None else evidence
-    return GroundStore(SqliteEngine(file), FolderEvidence(beside))
+    beside = str(file.with_name(f"{file.name}-evidence")) if evidence is None else evidence
+    return GroundStore(SqliteEngine(file), _evidence(beside))
+
+
+def _evidence(place: str) -> Evidence:
+    return SharedEvidence(place) if "://" in place else FolderEvidence(Path(place))
 
 
 def _postgres(url: str) -> Engine:

@@ -81,13 +81,13 @@ def _rounded_angle(angle_rad: float) -> float:
 
 def _drives(status: StatusReport, floor: FloorStatus, last_node: str) -> bool:
     """It is on its way, or turns for it: not while it looks at the shelf beside a node, nor where it is held
-    at the last one."""
-    if status.phase in AT_NODE:
+    at the last one, however the air moves it there."""
+    is_there = status.phase in FLYING and status.goal == last_node == _node_under(status, floor)
+    if status.phase in AT_NODE or is_there:
         return False
     if status.position is not None and status.position.speed_mps > _DRIVES_MPS:
         return True
-    under_way = status.phase in FLYING and status.phase is not Phase.HOLD
-    return under_way and not status.goal == last_node == _node_under(status, floor)
+    return status.phase in FLYING and status.phase is not Phase.HOLD
 
 
 def _node_under(status: StatusReport, floor: FloorStatus) -> str | None:

@@ -2,5 +2,5 @@
 own column names.
 
 `exchange` makes one pass by an `exchange_file`; `inbox` and `outbox` are its two halves, each in a
-`drop_folder`, here or wherever fsspec reaches.
+`shared_folder`, here or wherever fsspec reaches.
 """

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.ground.ground_store.store import GroundStore
-from flightd.ground.wms_exchange.drop_folder import DropFolder
+from flightd.ground.shared_folder import SharedFolder
 from flightd.ground.wms_exchange.exchange_file import CountsSection, ExchangeFile, ExpectedSection
 from flightd.ground.wms_exchange.inbox import Inbox, TakenFile
 from flightd.ground.wms_exchange.outbox import deliver_counts
@@ -33,7 +33,7 @@ class Exchange:
     path: Path
     asked: ExchangeFile
     store: GroundStore | None
-    folder: Callable[[str, Path, str], DropFolder] = DropFolder
+    folder: Callable[[str, Path, str], SharedFolder] = SharedFolder
     sleep: Callable[[float], None] = time.sleep
     utc_ns: Callable[[], int] = time.time_ns
 

@@ -15,8 +15,8 @@ from pathlib import Path, PurePosixPath
 from flightd.core.errors import InputError
 from flightd.ground.expected_stock_book import Drop, ExpectedStock, ExpectedStockBook
 from flightd.ground.read_folders import read_folders
+from flightd.ground.shared_folder import SharedFolder, Stamp
 from flightd.ground.stores import Stores
-from flightd.ground.wms_exchange.drop_folder import DropFolder, Stamp
 from flightd.ground.wms_exchange.exchange_file import ExpectedSection, StockNames
 from flightd.inventory.stock_columns import StockColumns
 from flightd.inventory.stock_table import MOST_BYTES, StockTable, read_table
@@ -40,7 +40,7 @@ class Inbox:
     """Takes the files of `folder` for `who`, as `asked` says."""
 
     def __init__(
-        self, folder: DropFolder, asked: ExpectedSection, who: str, file: Path, utc_ns: Callable[[], int]
+        self, folder: SharedFolder, asked: ExpectedSection, who: str, file: Path, utc_ns: Callable[[], int]
     ) -> None:
         """InputError where the station's folder has not the inventory; `file` is where that is said."""
         self._folder = folder

@@ -13,12 +13,12 @@ from flightd.core.inventory import LocationState
 from flightd.core.utc_time import utc_text
 from flightd.ground.ground_store.outbox import Outbox, PlaceCount
 from flightd.ground.ground_store.store import GroundStore
-from flightd.ground.wms_exchange.drop_folder import DropFolder
+from flightd.ground.shared_folder import SharedFolder
 from flightd.ground.wms_exchange.exchange_file import CountField, CountsSection
 
 
 def deliver_counts(
-    folder: DropFolder, store: GroundStore, asked: CountsSection, name: str, file: Path
+    folder: SharedFolder, store: GroundStore, asked: CountsSection, name: str, file: Path
 ) -> Iterator[str]:
     """All that changed since the last delivery to `name`; yields the names of files that lie there now.  Cut
     anywhere and begun again, it writes the same files.  InputError, which names the `file` that asks for it,

@@ -39,7 +39,7 @@ class BenchCase:
     seed: int = 1
 
 
-CASES: Final = (BenchCase(20, 5, 10), BenchCase(100, 20, 25), BenchCase(100, 20, 25, 8.0))
+CASES: Final = (BenchCase(20, 5, 10), BenchCase(100, 20, 25))
 """About 200 and 2,000 nodes, those of the docks among them."""
 
 

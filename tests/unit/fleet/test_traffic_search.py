@@ -7,9 +7,11 @@ import functools
 import itertools
 import random
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightd.fleet.traffic import sipp
 from flightd.fleet.traffic.action_graph import ActionGraph, Course
 from flightd.fleet.traffic.distances import Distances
 from flightd.fleet.traffic.lanes import lanes_of
@@ -18,6 +20,7 @@ from flightd.fleet.traffic.reservations import ENDLESS, ReservationTable
 from flightd.fleet.traffic.sections import NONE, sections_of
 from flightd.fleet.traffic.sipp import Effort, Sipp
 from flightd.fleet.traffic.steps import StepTable
+from flightd.sim.fleet.planning_bench import BenchCase, measure
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Pad
 from flightd.site.ways import OneWay
@@ -155,3 +158,14 @@ def test_a_fleet_that_flies_through_long_aisles_shares_no_cell() -> None:
     }
     assert not shared_cells(hall.lanes, courses)
     ActionGraph({d: Course(place, 0, actions) for d, (place, actions) in courses.items()}, hall.conflicts)
+
+
+def test_searches_that_take_long_are_hurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that a fleet is planned much sooner, and not much worse; conflicts would be an error there."""
+    case = BenchCase(40, 8, 10)
+    hurried = measure(case)
+    monkeypatch.setattr(sipp, "PATIENT_STATES", 10**9)
+    patient = measure(case)
+    assert hurried.planned == patient.planned == case.drones
+    assert hurried.states < 0.7 * patient.states
+    assert hurried.makespan_s < 1.2 * patient.makespan_s

@@ -11,16 +11,17 @@ import pytest
 
 from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.adapters.ground_link.messages.floor import FloorWay
-from flightd.adapters.ground_link.messages.published import EventReport, LinkReport, StatusReport
+from flightd.adapters.ground_link.messages.published import EventReport, LinkReport, Position, StatusReport
 from flightd.core.errors import InputError
 from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.fleet.vda5050.codec import Version
+from flightd.fleet.vda5050.state import OperatingMode
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.messages import LinkState
 from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
-from flightd.ground.mqtt.reported_drone import takes_orders
+from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
 from flightd.ground.mqtt.sent_commands import SentCommands
 from flightd.ground.mqtt.shelf_counts import counted_in_words
@@ -41,9 +42,9 @@ def status(phase: Phase, way: str = "", **more: Any) -> StatusReport:
     possible = (CommandKind.PLAN, CommandKind.START) if waits else IN_AIR
     return StatusReport(
         version=1, session="s", seq=1, stamp_ns=1, phase=phase, reason="", node="", goal=(nodes or ("",))[0],
-        nodes_done=0, nodes_planned=0, height_m=None, position=None, lines=(), lines_age_s=None, vehicle=None,
+        nodes_done=0, nodes_planned=0, height_m=None, lines=(), lines_age_s=None, vehicle=None,
         frames=0, frames_dropped=0, fps=0.0, latency_ms={}, link=LinkReport(0, 0, 0, 0, 0), way=nodes,
-        **{"possible": possible, "plan": "p", **more},
+        **{"possible": possible, "plan": "p", "position": None, **more},
     )  # fmt: skip
 
 
@@ -146,6 +147,26 @@ def test_a_node_is_reached_once() -> None:
     hovers = status(Phase.HOVER, "A2 A3 A1")
     assert reached(hovers, Wish(("A2", "A3"), "A1")) == "A2"
     assert reached(hovers, Wish(("A1", "A2"), "A2")) is None
+
+
+@pytest.mark.parametrize(
+    ("phase", "way", "beyond_m", "drives"),
+    [
+        (Phase.HOLD, "A4 A4 A1", 0.1, False),  # however the air moves it there
+        (Phase.HOVER, "A5 A4 A1", 0.1, False),
+        (Phase.HOLD, "A5 A4 A1", 0.1, True),  # paused, it comes to a stop on its way to the next one
+        (Phase.FOLLOW, "A5 A4 A1", 0.1, True),
+        (Phase.FOLLOW, "A4 A4 A1", 0.1, False),
+        (Phase.HOLD, "A4 A4 A1", 0.5, True),
+    ],
+)
+def test_a_drone_that_is_held_at_its_node_does_not_drive(
+    phase: Phase, way: str, beyond_m: float, drives: bool
+) -> None:
+    at = SITE.nodes["A4"]
+    seen = status(phase, way, position=Position(at.x_m + beyond_m, at.y_m, 0.0, speed_mps=0.2, integrity=1.0))
+    told = situation_of(seen, floor_status(SITE), OperatingMode.AUTOMATIC, last_node="A4")
+    assert told.driving is drives
 
 
 @pytest.mark.parametrize("name", ["demo", "racks", "racks-small"])

@@ -152,7 +152,7 @@ from flightd.ground.ground_store import sender
 from flightd.ground.ground_store.open_store import opened_store
 from flightd.ground.ground_store.sender import Delivered, deliver_inventory
 sender.MOST_LOOKS = 3
-with opened_store(sys.argv[1], Path(sys.argv[2])) as store:
+with opened_store(sys.argv[1], sys.argv[2]) as store:
     take = store.take
     def told(batch):
         taken = take(batch)

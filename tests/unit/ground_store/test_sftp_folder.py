@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from flightd.core.errors import UnavailableError
-from flightd.ground.wms_exchange.drop_folder import PASSWORD, DropFolder
+from flightd.core.errors import InputError, UnavailableError
+from flightd.ground.ground_store.open_store import opened_store
+from flightd.ground.shared_folder import PASSWORD, SharedFolder
 
 pytest.importorskip("paramiko", reason="folders over SFTP need it: pip install -e '.[exchange]'")
 
@@ -26,8 +27,8 @@ def host(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
         yield f"sftp://ann@127.0.0.1:{port}"
 
 
-def folder(url: str) -> DropFolder:
-    return DropFolder(url, Path("wms.toml"), "expected.inbox")
+def folder(url: str) -> SharedFolder:
+    return SharedFolder(url, Path("wms.toml"), "expected.inbox")
 
 
 def test_files_come_and_go(host: str, tmp_path: Path) -> None:
@@ -63,3 +64,30 @@ def test_a_wrong_password_is_one_line(host: str, tmp_path: Path, monkeypatch: py
     monkeypatch.setenv(PASSWORD, "of another hall")
     with pytest.raises(UnavailableError, match="cannot be opened: Authentication failed"):
         folder(f"{host}{tmp_path}")
+
+
+def test_pictures_of_a_store_lie_on_another_machine(host: str, tmp_path: Path) -> None:
+    jpeg = b"\xff\xd8 a label"
+    with opened_store(str(tmp_path / "counts.db"), f"{host}{tmp_path}/pictures") as store:
+        name = store.evidence.keep(jpeg)
+        assert store.evidence.keep(jpeg) == name
+        (file,) = [path for path in (tmp_path / "pictures").rglob("*") if path.is_file()]
+        assert (file.parent.name, file.name, file.read_bytes()) == (name[:2], f"{name}.jpg", jpeg)
+        assert store.evidence.picture(name) == jpeg
+        with pytest.raises(InputError, match="was not kept"):
+            store.evidence.picture("0" * 64)
+        with pytest.raises(InputError, match="not the name of a picture"):
+            store.evidence.has("../../etc/passwd")
+        file.write_bytes(jpeg[:4])  # as another program may leave it
+        with pytest.raises(UnavailableError, match=f"/{name}.jpg: the picture is damaged"):
+            store.evidence.picture(name)
+
+
+def test_a_place_for_pictures_that_cannot_be_had_is_one_line(tmp_path: Path) -> None:
+    for url, said in (
+        ("nowhere://bucket/pictures", "Protocol not known: nowhere"),
+        ("s3://bucket/pictures", "cannot be opened"),
+    ):
+        with pytest.raises(UnavailableError, match=said) as refused:
+            opened_store(str(tmp_path / "counts.db"), url)
+        assert str(refused.value).startswith(f"--evidence: {url}: cannot be opened: ")

@@ -1,4 +1,4 @@
-"""A folder that another program fills or empties, here or wherever fsspec reaches.
+"""A folder that is shared with other programs or machines, here or wherever fsspec reaches.
 
 Files get their names by renaming: nobody sees half of one.  That holds where renaming is one step, as on a
 disk and over SFTP.
@@ -24,18 +24,28 @@ Stamp: TypeAlias = tuple[int, str]
 _WRITTEN_STILL = (".tmp", ".part", ".partial", ".filepart", ".crdownload", "~")
 
 
-class DropFolder:
-    """The folder at `address`, which `key` of `file` names.
+class SharedFolder:
+    """The folder at `address`, which `key` of `file` names, for the command or option `what`.
 
     Whatever it refuses is an UnavailableError that names all three."""
 
-    def __init__(self, address: str, file: Path, key: str) -> None:
-        """InputError where there is no such folder."""
+    def __init__(
+        self,
+        address: str,
+        file: Path | str,
+        key: str,
+        *,
+        what: str = "flightd store exchange",
+        make: bool = False,
+    ) -> None:
+        """InputError where there is no such folder, unless it is to be made."""
         self._file, self._key = file, key
         self.address = address
         with self._refusals("cannot be opened"):
-            self._files, self._path = file_system(address, file, key)
-            if not self._files.isdir(self._path):
+            self._files, self._path = file_system(address, file, key, what)
+            if make:
+                self._files.makedirs(self._path, exist_ok=True)
+            elif not self._files.isdir(self._path):
                 self.close()
                 remedy = "make it, or correct the key"
                 raise InputError(f"{address}: there is no such folder", file=file, key=key, remedy=remedy)
@@ -59,6 +69,12 @@ class DropFolder:
             for name, one in found.items()
             if one["type"] == "file" and not name.startswith(".") and not name.endswith(_WRITTEN_STILL)
         }
+
+    def has(self, name: str) -> bool:
+        """Whether there is a file of this name."""
+        with self._refusals(f"{name} cannot be looked for"):
+            self._files.invalidate_cache()
+            return bool(self._files.isfile(self._at(name)))
 
     def read(self, name: str, most: int) -> bytes:
         """At most so many bytes of it."""
@@ -117,23 +133,23 @@ class DropFolder:
             ) from None
 
 
-def file_system(address: str, file: Path, key: str) -> tuple[Any, str]:
-    """The file system of a folder or URL, and the path on it."""
+def file_system(address: str, file: Path | str, key: str, what: str) -> tuple[Any, str]:
+    """The file system of a folder or URL, and the path on it, for the command or option `what`."""
     try:
         import fsspec
     except ModuleNotFoundError:
-        raise missing_extra("exchange", "flightd store exchange") from None
+        raise missing_extra("exchange", what) from None
     if urlsplit(address).scheme in {"sftp", "ssh"}:
         return _sftp(address, file, key)
     files, path = fsspec.core.url_to_fs(address, skip_instance_cache=True)
     return files, str(path)
 
 
-def _sftp(address: str, file: Path, key: str) -> tuple[Any, str]:
+def _sftp(address: str, file: Path | str, key: str) -> tuple[Any, str]:
     parts = urlsplit(address)
     if parts.password:
         raise InputError(
-            "a password does not belong into the file",
+            "a password does not belong into an address",
             file=file,
             key=key,
             remedy=f"give it in {PASSWORD}, or use a key",
@@ -141,7 +157,7 @@ def _sftp(address: str, file: Path, key: str) -> tuple[Any, str]:
     if not parts.hostname or not parts.path:
         raise InputError("not the URL of a folder", file=file, key=key, remedy="give sftp://USER@HOST/FOLDER")
     try:
-        from flightd.ground.wms_exchange.known_host_sftp import KnownHostSftp
+        from flightd.ground.known_host_sftp import KnownHostSftp
     except ModuleNotFoundError:
         raise missing_extra("exchange", "sftp://…") from None
     given = {"port": parts.port, "username": parts.username, "password": os.environ.get(PASSWORD)}
@@ -150,7 +166,8 @@ def _sftp(address: str, file: Path, key: str) -> tuple[Any, str]:
 
 
 def _refused_by() -> tuple[type[Exception], ...]:
-    """What file systems raise; paramiko's own where it is in use."""
-    paramiko = sys.modules.get("paramiko")
+    """What file systems raise; those of SFTP and S3 have errors of their own, where they are in use."""
+    paramiko, boto = sys.modules.get("paramiko"), sys.modules.get("botocore.exceptions")
     ssh = () if paramiko is None else (paramiko.SSHException,)
-    return (OSError, EOFError, ValueError, ImportError, *ssh)
+    s3 = () if boto is None else (boto.BotoCoreError, boto.ClientError)
+    return (OSError, EOFError, ValueError, ImportError, *ssh, *s3)
