@@ -231,7 +231,9 @@ class FleetDrone:
         status, vehicle = self.drone.status, self.drone.vehicle
         told = () if status is None else status.way
         base = [self._node_of(step) for step in self._base]
-        self.air.close([(vehicle.last_node, *vehicle.ahead), told, base], self._doubt_m(status))
+        holds = self.drone.is_heard and status is not None and status.phase is Phase.HOLD
+        holds = holds and status is not None and status.position is not None
+        self.air.close([(vehicle.last_node, *vehicle.ahead), told, base], self._doubt_m(status), holds=holds)
 
     @property
     def way_home(self) -> frozenset[int]:

@@ -160,6 +160,22 @@ def test_a_named_drone_visits_what_it_is_asked_for_round_the_one_that_a_person_t
     fly(go)
 
 
+def test_who_lost_his_place_for_a_moment_while_he_holds_keeps_others_no_longer() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        await on_way_to("B3", fleet)
+        await b.act(Act("by-ann-1", CommandKind.PAUSE))
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: a.phase is Phase.FOLLOW and a.way[0] == "A3", 100)
+        b.sees = False
+        await until(lambda: a.phase is Phase.HOLD, 20)
+        b.sees = True
+        await until(lambda: a.phase is Phase.DONE, 200)
+        assert (b.phase, fleet.state["done"]) == (Phase.HOLD, ["A3"])
+
+    fly(go, "ab")
+
+
 def test_a_drone_that_holds_over_a_node_is_flown_on_when_it_is_given_back() -> None:
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
