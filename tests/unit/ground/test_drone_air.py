@@ -82,6 +82,13 @@ def test_air_grows_from_where_it_was_seen_last_and_over_all_that_it_was_released
     assert (air.closed, air.doubt_m) == (frozenset(), 0.0)
 
 
+def test_who_holds_beside_a_crossing_is_not_on_the_line_across() -> None:
+    b2 = FLOOR.lanes.vertices[B2]
+    lane = FLOOR.around((b2.x_m + 0.8, b2.y_m))
+    assert len(lane) == 1
+    assert [FLOOR.around((b2.x_m + 0.39, b2.y_m + off_m)) for off_m in (-0.12, 0.12)] == [lane, lane]
+
+
 def test_who_holds_and_knows_his_place_again_is_beside_his_air_no_more() -> None:
     air = seen(told(Phase.HOLD, "B2"))
     closed = air.closed
