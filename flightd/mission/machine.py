@@ -160,7 +160,9 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
         Trigger.ARMED: Phase.TAKE_OFF,
     },
     Phase.TAKE_OFF: _UNDER_WAY
-    | dict.fromkeys((Trigger.HEIGHT_WRONG, Trigger.CLOCK_UNSURE, Trigger.FRAMES_STALE), Phase.LAND)
+    | dict.fromkeys(
+        (Trigger.HEIGHT_WRONG, Trigger.CLOCK_UNSURE, Trigger.CAMERA_FROZEN, Trigger.FRAMES_STALE), Phase.LAND
+    )
     | {Trigger.AT_HEIGHT: Phase.ACQUIRE},
     Phase.ACQUIRE: _ON_LINES | {Trigger.ACQUIRED: Phase.TURN},
     Phase.FOLLOW: _ON_LINES | {Trigger.ARRIVED: Phase.HOVER},

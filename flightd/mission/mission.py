@@ -52,8 +52,6 @@ _INTERRUPTED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
 _OVER_PAD_M = 0.5
 """So near its centre a landing goes on onto the pad, whatever the position was taken for before."""
-_CLIMBS_UNSEEING_S = 1.0
-"""So long a take-off, which hardly steers, goes on without a picture."""
 _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 _RANK = {trigger: rank for rank, trigger in enumerate(Trigger)}
 
@@ -300,8 +298,6 @@ class Mission:
                 found |= self._lost(action, lost, s.now_ns)
         if Trigger.HOLD in found:
             found.discard(Trigger.LINES_FOUND)
-        if self.phase is Phase.TAKE_OFF and s.warnings.frame_age_s < _CLIMBS_UNSEEING_S:
-            found.discard(Trigger.FRAMES_STALE)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._progress.adopting(s, self.phase) else found
@@ -344,8 +340,14 @@ class Mission:
             self._leg_along_x = self._leads_along_x()
         elif self.phase not in _INTERRUPTED:
             self._leg_along_x = None
-        at_height = self.airborne and self.phase not in _NEAR_FLOOR
-        return FlightContext(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD, at_height)
+        return FlightContext(
+            self.airborne,
+            paused,
+            self._leg_along_x,
+            self.phase is Phase.HOLD,
+            at_height=self.airborne and self.phase not in _NEAR_FLOOR,
+            takes_off=self.phase is Phase.TAKE_OFF,
+        )
 
     def _grounded(self, s: MissionInputs) -> Reason | None:
         """Why it stays on the ground, None if nothing keeps it there."""
