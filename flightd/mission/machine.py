@@ -167,7 +167,12 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
     Phase.ACQUIRE: _ON_LINES | {Trigger.ACQUIRED: Phase.TURN},
     Phase.FOLLOW: _ON_LINES | {Trigger.ARRIVED: Phase.HOVER},
     Phase.HOVER: _ON_LINES
-    | {Trigger.SCAN_DUE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
+    | {
+        Trigger.SCAN_DUE: Phase.CLIMB,
+        Trigger.AWAITS_MORE: Phase.HOLD,
+        Trigger.DWELLED: Phase.TURN,
+        Trigger.ROUTE_DONE: Phase.LAND,
+    },
     Phase.CLIMB: _ON_LINES | {Trigger.AT_VIEW: Phase.SCAN},
     Phase.SCAN: _ON_LINES
     | {Trigger.VIEW_DONE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
@@ -197,8 +202,9 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
 }
 """Which phase a trigger begins, whatever the intent; `_begins` has what depends on that."""
 
-_FOR_VISITS = frozenset({Trigger.READY, Trigger.SCAN_DUE, Trigger.VIEW_DONE})
-"""What leads on only where the plan is flown: nothing starts unordered or is scanned on the way back."""
+_FOR_VISITS = frozenset({Trigger.READY, Trigger.SCAN_DUE, Trigger.VIEW_DONE, Trigger.AWAITS_MORE})
+"""What leads on only where the plan is flown: nothing starts unordered, is scanned or waits on the way
+back."""
 
 _OVER_PAD: Mapping[tuple[Trigger, Intent], tuple[Phase, Cause]] = {
     (Trigger.DOWN_TO_SWAP, Intent.RETURN): (Phase.SWAP, Cause.TRIGGER),

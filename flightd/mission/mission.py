@@ -97,6 +97,8 @@ class Mission:
         self._charging = BatterySwap(site, policy, config, scanner, self._route, self._monitor)
         self._reporter = PhaseReporter(self._events, self._route, self._scan)
         self.state = BEGIN
+        self._awaits_more = False
+        """It holds at the end of its way."""
         self._swapped = False
         """It has landed for a fresh battery, and goes on with nothing less."""
         self._leg_along_x: bool | None = None
@@ -183,6 +185,7 @@ class Mission:
             battery_left_s=left_s,
             home_s=home_s,
             plan=self._plan.id,
+            waits_at=self._route.waits_at,
         )
 
     def drain_events(self) -> tuple[Event, ...]:
@@ -213,7 +216,8 @@ class Mission:
             self._go_home(trigger, Happened(trigger), now_ns)
         elif kind is CommandKind.GOTO:
             self._route.shorten(self._pose)
-            self._route.go_to(now_ns, command.node)
+            halted = self.phase is Phase.HOLD
+            self._route.go_to(now_ns, command.node, waits=command.waits, halted=halted)
 
     def _take_plan(self, command: Command, now_ns: int) -> None:
         """Fly other nodes with the next start, or again what the configuration says; one that cannot be flown
@@ -286,7 +290,8 @@ class Mission:
             self._turn(Trigger.START_EXPIRED)
         if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
             found -= self._orders.urgent
-        found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
+        waits = self._awaits_more and self.goal.waits
+        found |= self._monitor.step(s, self._situation(waits or Trigger.HOLD in found))
         for lost, action in self._losses.on_board.items():
             if lost in found:
                 found.remove(lost)
@@ -385,7 +390,7 @@ class Mission:
         before, outcome = self.state, TABLE[self.state][trigger]
         if outcome is None:
             return
-        self.state = outcome.state
+        self.state, self._awaits_more = outcome.state, trigger is Trigger.AWAITS_MORE
         if trigger in _VISITED and not before.returning and not self._scan.legs:
             self._route.note_visit(s.now_ns)
         self._scan.follow(s, before.phase, self.phase, trigger, self.goal, self._relocator.shift_m)

@@ -1,5 +1,5 @@
-"""The traffic of a station's drones as its page and programs read it: what each did lately, does and is
-to do, the air that is closed on its account, and the work."""
+"""The traffic of a station's drones as its page and programs read it: what each did lately, does and is to
+do, and the air that is closed on its account."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from flightd.fleet.traffic.drone_course import DroneCourse
 from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action
 from flightd.fleet.traffic.traffic_control import TrafficControl
-from flightd.fleet.traffic.work_queue import WorkQueue
 from flightd.ground.fleet.fleet_drone import FleetDrone
 
 MOST_AHEAD: Final = 60
@@ -31,9 +30,8 @@ class _Done:
 class TrafficView:
     """`see` it after every step; `document` is as JSON has it, and moves nothing."""
 
-    def __init__(self, control: TrafficControl, queue: WorkQueue, drones: Mapping[str, FleetDrone]) -> None:
+    def __init__(self, control: TrafficControl, drones: Mapping[str, FleetDrone]) -> None:
         self._control = control
-        self._queue = queue
         self._drones = drones
         self._now_ms = 0
         self._ahead: Mapping[str, list[Action]] | None = None
@@ -50,44 +48,43 @@ class TrafficView:
                 begin_ms = now_ms
             self._base[name] = course.done, course.since_ms, tuple(course.base)
 
-    def document(self, flown: frozenset[str]) -> dict[str, Any]:
-        """`flown` are the drones that traffic flies now.  Times are seconds from the last step."""
-        if self._ahead is None:
-            self._ahead = self._control.projected(self._now_ms)
-        closed = self._control.closed_by()
-        return {
-            "drones": {
-                name: {
-                    **self._told(name, course, self._ahead[name]),
-                    "flown": name in flown,
-                    "waits_for": list(self._control.waits(name)) if name in flown else [],
-                    "why": "" if name in flown else self._drones[name].why,
-                    "closed": self._air(closed.get(name, frozenset())),
-                }
-                for name, course in self._control.drones.items()
-            },
-            "open": list(self._queue.open),
-            "given": dict(self._queue.given),
-            "done": list(self._queue.done),
-            "not_done": dict(self._queue.reasons),
+    def document(self, flown: frozenset[str], *, in_full: bool = True) -> dict[str, Any]:
+        """`flown` are the drones that traffic flies now.  Times are seconds from the last step; what lies
+        ahead and behind, and closed air, are told `in_full` only."""
+        closed = self._control.closed_by() if in_full else {}
+        drones = {
+            name: {
+                **self._now(name, course, is_flown=name in flown),
+                **self._in_time(name, course, in_full=in_full),
+                "closed": self._air(closed.get(name, frozenset())),
+            }
+            for name, course in self._control.drones.items()
         }
+        return {"drones": drones}
 
-    def _told(self, name: str, course: DroneCourse, ahead: list[Action]) -> dict[str, Any]:
-        drone, released = self._drones[name], len(course.base)
+    def _now(self, name: str, course: DroneCourse, *, is_flown: bool) -> dict[str, Any]:
+        drone = self._drones[name]
         return {
+            "flown": is_flown,
             "at": self._node(course.place),
             "pad": drone.pad.node,
             "rests": drone.air.rests,
             "base": [self._node(action.vertex) for action in course.base],
-            "tour": list(dict.fromkeys(self._node(one.vertex) for one in ahead if one.act is Act.COUNT)),
             "doubt_m": round(course.doubt_m, 2),
-            "plan": [
-                {
-                    **self._timed(action.act, action.vertex, action.start_ms, action.end_ms),
-                    "released": i < released,
-                }
-                for i, action in enumerate(ahead[:MOST_AHEAD])
-            ],
+            "waits_for": list(self._control.waits(name)) if is_flown else [],
+            "why": "" if is_flown else drone.why,
+        }
+
+    def _in_time(self, name: str, course: DroneCourse, *, in_full: bool) -> dict[str, Any]:
+        if not in_full:
+            return {"tour": [], "plan": [], "past": []}
+        if self._ahead is None:
+            self._ahead = self._control.projected(self._now_ms)
+        ahead, released = self._ahead[name], len(course.base)
+        plan = [self._timed(one.act, one.vertex, one.start_ms, one.end_ms) for one in ahead[:MOST_AHEAD]]
+        return {
+            "tour": list(dict.fromkeys(self._node(one.vertex) for one in ahead if one.act is Act.COUNT)),
+            "plan": [{**one, "released": i < released} for i, one in enumerate(plan)],
             "past": [self._timed(one.act, one.vertex, one.begin_ms, one.end_ms) for one in self._past[name]],
         }
 

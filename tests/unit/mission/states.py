@@ -340,6 +340,9 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.SCAN_DUE: Stimulus(_idle, scanning=(Phase.HOVER,)),
     Trigger.AT_VIEW: Stimulus(_idle, 10.0, follow=True),
     Trigger.VIEW_DONE: Stimulus(_idle, 0.6),
+    Trigger.AWAITS_MORE: Stimulus(
+        lambda flight: flight.order(CommandKind.GOTO, "A3", waits=True), 0.04, hold=False
+    ),
     Trigger.DWELLED: placed(1.2),
     Trigger.TURNED: placed(),
     Trigger.ROUTE_DONE: placed(1.2),
