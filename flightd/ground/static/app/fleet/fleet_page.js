@@ -61,7 +61,7 @@ function Halls({ halls, hall }) {
 
 function NoMap({ names }) {
   return html`
-    <section class="card"><h3>${names.length ? say("No drone has told its map yet") : say("No drone yet")}</h3>
+    <section class="card"><h3>${names.length ? say("Not heard yet") : say("No drone yet")}</h3>
       ${!names.length && html`<p>${say("Start one:")} <code>flightd sim --speed 1 --set ground.listen=127.0.0.1</code></p>`}
     </section>
   `;
@@ -73,7 +73,7 @@ function Traffic({ told, none, trouble }) {
   if (none) {
     return html`
       <section class="card" aria-labelledby="no-fleet"><h3 id="no-fleet">${say("People fly these drones")}</h3>
-        <p>${sayWith("The station flies them together where it is started with {option}: each from a pad of its own, all by the same map.", { option: html`<code>--fleet</code>` })}</p>
+        <p>${sayWith("The station flies them together where it is started with {option}.", { option: html`<code>--fleet</code>` })}</p>
         <p><a href="/guide/fleet">${say("In the guide")}</a></p>
       </section>`;
   }

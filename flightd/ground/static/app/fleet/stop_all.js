@@ -28,7 +28,7 @@ export function StopAll({ names }) {
       </button>
       <div class="stop-all-said" role="status">
         ${!stop && html`<span class="quiet">${say("Press twice: every drone comes down at once.")}</span>`}
-        ${isArmed && html`<span>${say("Armed for 5 seconds: press again to stop every drone.")}</span><i class="stop-all-left" aria-hidden="true" />`}
+        ${isArmed && html`<span>${say("Armed for 5 seconds.")}</span><i class="stop-all-left" aria-hidden="true" />`}
         ${stop && !isArmed && html`<${Outcomes} names=${names} stop=${stop} />`}
       </div>
       ${stop?.stage === "told" && html`<button class="tab" onClick=${() => change({ stop: null })}>${say("Close")}</button>`}
