@@ -34,7 +34,7 @@ def test_what_shows_only_at_the_landing_is_counted_from_there() -> None:
 
 
 def test_where_the_daemon_is_dead_it_is_counted_from_its_death() -> None:
-    """Simulated it lives on beside the dead link, which it takes for a silent vehicle: it holds, then lands."""
+    """Simulated it lives on beside the dead link, takes that for a silent vehicle, holds, and lands."""
     statuses = [
         status(0),
         status(24 * S),
