@@ -138,7 +138,8 @@ class Pilot:
         dt_s = TICK_S if self._last_ns is None else max((now_ns - self._last_ns) * 1e-9, 1e-3)
         self._last_ns = now_ns
         self._take(tick.commands, now_ns)
-        armed = tick.vehicle is not None and tick.vehicle.armed
+        # a vehicle that tells nothing has not disarmed: where the drone is would be forgotten
+        armed = self._estimator.armed if tick.vehicle is None else tick.vehicle.armed
         if armed is not self._estimator.armed:
             self._estimator.begin(self._mission.stand, armed=armed)
             self._plausibility.begin()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flightd.core.types import HEALTHY, Health
+from flightd.core.types import HEALTHY, Health, VehicleState
 
 _BORNE_NS = 1_000_000_000
 """So long what was answered last stands for what a part is not able to tell."""
@@ -21,6 +21,14 @@ class LastAnswers:
         self._vision = self._recorder = HEALTHY
         self._vision_ns: int | None = None
         self._recorder_ns: int | None = None
+        self._vehicle: VehicleState | None = None
+
+    def vehicle(self, told: tuple[VehicleState | None] | None) -> VehicleState | None:
+        """What a vehicle that fails told last: it grows old by its own stamps.  None of it would say that the
+        drone is not armed."""
+        if told is not None:
+            (self._vehicle,) = told
+        return self._vehicle
 
     def ground_silent_s(self, now_ns: int, silent_s: float | None) -> float:
         """A link that fails is silent from its last answer on; nobody is missed who did not attend then."""

@@ -54,7 +54,7 @@ class Tick:
         return TickInput(
             now_ns,
             call("detection", lambda: flight.vision.fresh(now_ns), ()),
-            call("vehicle", flight.vehicle.state, None),
+            last.vehicle(call("vehicle", lambda: (flight.vehicle.state(),), None)),
             call("vehicle", lambda: tuple(flight.vehicle.attitudes()), ()),
             call("ground link", self._take_commands, ()),
             last.ground_silent_s(now_ns, call("ground link", lambda: flight.ground.silent_s(now_ns), None)),

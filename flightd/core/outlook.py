@@ -20,7 +20,8 @@ class Outlook:
     """`obstacles` is all that keeps the drone on the ground while it waits there, worst first; `way` the
     nodes that it flies over next, in order (not those far ahead).  `battery_left_s` is how long the charge
     above the reserve lasts in the air and `home_s` how long the way to the nearest charge pad takes; NaN: not
-    known.  `plan` is the id of the order that the plan came with; empty: the configuration's."""
+    known.  `plan` is the id of the order that the plan came with; empty: the configuration's.  At the node
+    `waits_at` its way ends, and it holds until it is told where to fly on; empty: it flies home."""
 
     hazards: tuple[HazardSeen, ...] = ()
     obstacles: tuple[str, ...] = ()
@@ -28,6 +29,7 @@ class Outlook:
     battery_left_s: float = math.nan
     home_s: float = math.nan
     plan: str = ""
+    waits_at: str = ""
 
 
 NO_OUTLOOK = Outlook()

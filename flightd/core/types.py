@@ -369,7 +369,8 @@ class Command:
 
     PLAN: to visit `nodes` in that order with the next start (none: what the configuration says) and to count
     what hangs on the shelf `levels` there (none: on all).  START with `plan`: only if the plan that stands is
-    the one that was ordered with this id."""
+    the one that was ordered with this id.  PLAN and GOTO that `waits`: at the end hold there until another
+    order, rather than fly home."""
 
     id: str
     kind: CommandKind
@@ -377,6 +378,7 @@ class Command:
     nodes: tuple[str, ...] = ()
     levels: tuple[int, ...] = ()
     plan: str = ""
+    waits: bool = False
 
 
 class Phase(enum.StrEnum):

@@ -148,7 +148,13 @@ class DroneLink:
                 return await client.order(act.command, act.node, act.id, session="", seen_ns=0)
             session, seen_ns = act.session or None, act.seen_ns or None
             return await client.order(
-                act.command, act.node, act.id, session=session, seen_ns=seen_ns, plan=act.plan
+                act.command,
+                act.node,
+                act.id,
+                session=session,
+                seen_ns=seen_ns,
+                plan=act.plan,
+                waits=act.waits,
             )
 
     async def plan_flight(
@@ -161,6 +167,7 @@ class DroneLink:
         dry: bool = False,
         session: str = "",
         seen_ns: int = 0,
+        waits: bool = False,
         by_person: bool = True,
     ) -> Planned:
         """Hand the drone the nodes of its next flight, or ask what that would be.  As `act` raises."""
@@ -175,6 +182,7 @@ class DroneLink:
                 dry=dry,
                 session=session or None,
                 seen_ns=seen_ns or None,
+                waits=waits,
             )
 
     @contextmanager

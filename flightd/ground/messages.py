@@ -76,6 +76,8 @@ class Act(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The flight that the person saw, from `welcome`; empty: the one that the station sees."""
     seen_ns: Annotated[int, Meta(ge=0)] = 0
     """`stamp_ns` of the newest status that the page had; 0: that of the station."""
+    waits: bool = False
+    """Only with goto: hold there, rather than fly home."""
 
 
 class SessionState(msgspec.Struct, frozen=True):

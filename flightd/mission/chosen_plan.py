@@ -37,11 +37,16 @@ class ChosenPlans:
         self._scanner = scanner
 
     def plan(
-        self, nodes: Sequence[str], levels: Sequence[int] = (), *, best_order: bool = False
+        self,
+        nodes: Sequence[str],
+        levels: Sequence[int] = (),
+        *,
+        best_order: bool = False,
+        waits: bool = False,
     ) -> FlightPlan:
-        """The plan over these nodes, each once.  InputError, one line, for a node that the site lacks, that
-        no open line leads to or that a full battery does not reach and come back from, and for levels that
-        nothing is counted on."""
+        """The plan over these nodes, each once, home or (`waits`) to hold at the last.  InputError, one line,
+        for a node that the site lacks, that no open line leads to or that a full battery does not reach and
+        come back from, and for levels that nothing is counted on."""
         wanted = tuple(dict.fromkeys(nodes))
         self._check(wanted, levels)
         first = self._first
@@ -51,7 +56,8 @@ class ChosenPlans:
         elif best_order:
             place = {node: i for i, node in enumerate(self._site.serpentine_route())}
             wanted = tuple(sorted(wanted, key=lambda node: place.get(node, len(place))))
-        plan = make_plan(self._site, wanted, first.start, first.home, self._policy, first.start_yaw_rad)
+        ends, yaw_rad = (first.start, first.home), first.start_yaw_rad
+        plan = make_plan(self._site, wanted, *ends, self._policy, yaw_rad, waits=waits)
         far = self._sorties(levels).out_of_reach(wanted)
         if far:
             raise InputError(

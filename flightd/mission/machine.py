@@ -160,12 +160,19 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
         Trigger.ARMED: Phase.TAKE_OFF,
     },
     Phase.TAKE_OFF: _UNDER_WAY
-    | dict.fromkeys((Trigger.HEIGHT_WRONG, Trigger.CLOCK_UNSURE, Trigger.FRAMES_STALE), Phase.LAND)
+    | dict.fromkeys(
+        (Trigger.HEIGHT_WRONG, Trigger.CLOCK_UNSURE, Trigger.CAMERA_FROZEN, Trigger.FRAMES_STALE), Phase.LAND
+    )
     | {Trigger.AT_HEIGHT: Phase.ACQUIRE},
     Phase.ACQUIRE: _ON_LINES | {Trigger.ACQUIRED: Phase.TURN},
     Phase.FOLLOW: _ON_LINES | {Trigger.ARRIVED: Phase.HOVER},
     Phase.HOVER: _ON_LINES
-    | {Trigger.SCAN_DUE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
+    | {
+        Trigger.SCAN_DUE: Phase.CLIMB,
+        Trigger.AWAITS_MORE: Phase.HOLD,
+        Trigger.DWELLED: Phase.TURN,
+        Trigger.ROUTE_DONE: Phase.LAND,
+    },
     Phase.CLIMB: _ON_LINES | {Trigger.AT_VIEW: Phase.SCAN},
     Phase.SCAN: _ON_LINES
     | {Trigger.VIEW_DONE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
@@ -195,8 +202,9 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
 }
 """Which phase a trigger begins, whatever the intent; `_begins` has what depends on that."""
 
-_FOR_VISITS = frozenset({Trigger.READY, Trigger.SCAN_DUE, Trigger.VIEW_DONE})
-"""What leads on only where the plan is flown: nothing starts unordered or is scanned on the way back."""
+_FOR_VISITS = frozenset({Trigger.READY, Trigger.SCAN_DUE, Trigger.VIEW_DONE, Trigger.AWAITS_MORE})
+"""What leads on only where the plan is flown: nothing starts unordered, is scanned or waits on the way
+back."""
 
 _OVER_PAD: Mapping[tuple[Trigger, Intent], tuple[Phase, Cause]] = {
     (Trigger.DOWN_TO_SWAP, Intent.RETURN): (Phase.SWAP, Cause.TRIGGER),

@@ -52,8 +52,6 @@ _INTERRUPTED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
 """Where a leg that was interrupted goes on from."""
 _OVER_PAD_M = 0.5
 """So near its centre a landing goes on onto the pad, whatever the position was taken for before."""
-_CLIMBS_UNSEEING_S = 1.0
-"""So long a take-off, which hardly steers, goes on without a picture."""
 _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 _RANK = {trigger: rank for rank, trigger in enumerate(Trigger)}
 
@@ -99,6 +97,8 @@ class Mission:
         self._charging = BatterySwap(site, policy, config, scanner, self._route, self._monitor)
         self._reporter = PhaseReporter(self._events, self._route, self._scan)
         self.state = BEGIN
+        self._awaits_more = False
+        """It holds at the end of its way."""
         self._swapped = False
         """It has landed for a fresh battery, and goes on with nothing less."""
         self._leg_along_x: bool | None = None
@@ -185,6 +185,7 @@ class Mission:
             battery_left_s=left_s,
             home_s=home_s,
             plan=self._plan.id,
+            waits_at=self._route.waits_at,
         )
 
     def drain_events(self) -> tuple[Event, ...]:
@@ -215,7 +216,8 @@ class Mission:
             self._go_home(trigger, Happened(trigger), now_ns)
         elif kind is CommandKind.GOTO:
             self._route.shorten(self._pose)
-            self._route.go_to(now_ns, command.node)
+            halted = self.phase is Phase.HOLD
+            self._route.go_to(now_ns, command.node, waits=command.waits, halted=halted)
 
     def _take_plan(self, command: Command, now_ns: int) -> None:
         """Fly other nodes with the next start, or again what the configuration says; one that cannot be flown
@@ -288,15 +290,14 @@ class Mission:
             self._turn(Trigger.START_EXPIRED)
         if Trigger.FOUND_FLYING in found:  # an order to land or stop stands until it may be obeyed
             found -= self._orders.urgent
-        found |= self._monitor.step(s, self._situation(Trigger.HOLD in found))
+        waits = self._awaits_more and self.goal.waits
+        found |= self._monitor.step(s, self._situation(waits or Trigger.HOLD in found))
         for lost, action in self._losses.on_board.items():
             if lost in found:
                 found.remove(lost)
                 found |= self._lost(action, lost, s.now_ns)
         if Trigger.HOLD in found:
             found.discard(Trigger.LINES_FOUND)
-        if self.phase is Phase.TAKE_OFF and s.warnings.frame_age_s < _CLIMBS_UNSEEING_S:
-            found.discard(Trigger.FRAMES_STALE)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._progress.adopting(s, self.phase) else found
@@ -339,8 +340,14 @@ class Mission:
             self._leg_along_x = self._leads_along_x()
         elif self.phase not in _INTERRUPTED:
             self._leg_along_x = None
-        at_height = self.airborne and self.phase not in _NEAR_FLOOR
-        return FlightContext(self.airborne, paused, self._leg_along_x, self.phase is Phase.HOLD, at_height)
+        return FlightContext(
+            self.airborne,
+            paused,
+            self._leg_along_x,
+            self.phase is Phase.HOLD,
+            at_height=self.airborne and self.phase not in _NEAR_FLOOR,
+            takes_off=self.phase is Phase.TAKE_OFF,
+        )
 
     def _grounded(self, s: MissionInputs) -> Reason | None:
         """Why it stays on the ground, None if nothing keeps it there."""
@@ -383,7 +390,7 @@ class Mission:
         before, outcome = self.state, TABLE[self.state][trigger]
         if outcome is None:
             return
-        self.state = outcome.state
+        self.state, self._awaits_more = outcome.state, trigger is Trigger.AWAITS_MORE
         if trigger in _VISITED and not before.returning and not self._scan.legs:
             self._route.note_visit(s.now_ns)
         self._scan.follow(s, before.phase, self.phase, trigger, self.goal, self._relocator.shift_m)

@@ -92,4 +92,4 @@ def _alarming(before: State, after: State, trigger: Trigger) -> bool:
         return True
     if after.phase in {Phase.ABORTED, Phase.PILOT}:  # a landing has been reported already
         return before.phase is not Phase.LAND or (before.stopped and trigger is not Trigger.DISARMED)
-    return after.halted
+    return after.halted and trigger is not Trigger.AWAITS_MORE

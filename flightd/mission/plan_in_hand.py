@@ -30,13 +30,14 @@ class PlanInHand:
         """Hold the plan over the nodes and levels of a command, or again the configured one (no nodes), and
         say which in words.  InputError where it cannot be flown: nothing changes."""
         if command.nodes:
-            plan = self._chosen.plan(command.nodes, command.levels)
+            plan = self._chosen.plan(command.nodes, command.levels, waits=command.waits)
             self.plan, self.id, self._levels = plan, command.id, command.levels
         else:
             self.plan, self.id, self._levels = self._configured, "", ()
         self._scanner.choose(self._levels)
         text = f"{self.plan.nodes} nodes" if command.nodes else "as configured again"
-        return f"{text}, counted on level {', '.join(map(str, self._levels))}" if self._levels else text
+        text += f", counted on level {', '.join(map(str, self._levels))}" if self._levels else ""
+        return f"{text}, to hold at the last" if self.plan.waits else text
 
     def standing(self, visited: Sequence[str], remaining: tuple[str, ...]) -> StandingPlan:
         """What is told of it."""

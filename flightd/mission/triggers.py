@@ -61,6 +61,7 @@ class Trigger(enum.Enum):
     SCAN_DUE = "locations to scan"
     AT_VIEW = "view reached"
     VIEW_DONE = "view scanned"
+    AWAITS_MORE = "waiting to be told where to fly on"
     DWELLED = "dwell over"
     TURNED = "turned"
     ROUTE_DONE = "route done"

@@ -72,6 +72,11 @@ class DeviceClock:
         """Our time less the device's, the path's least delay included; None before the first message."""
         return self._offset_ns
 
+    @property
+    def begun(self) -> int:
+        """The number of the message with which the device's count began, the last time that it did."""
+        return self._begun
+
     def _confirmed(self, device_ns: int, offset: int) -> int | None:
         """The offset of a path that has grown faster; None as long as this may be a wrong stamp."""
         lately = [one for one in self._sooner if one[0] > self._count - _LATELY and one[1] < device_ns]

@@ -20,7 +20,7 @@ from flightd.adapters.ground_link.messages.published import (
     StatusReport,
     VehicleReport,
 )
-from flightd.core.errors import RunError
+from flightd.core.errors import FlightdError, RunError
 from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.ground.messages import Act, LinkState
 from flightd.sim.fleet.world import FleetDrone
@@ -43,11 +43,13 @@ _COUNTS_S = 6.0
 _LASTS_S = {Phase.TAKE_OFF: 3.0, Phase.HOVER: 1.0, Phase.LAND: 3.0, Phase.RECOVER: 3.0}
 
 
-def hall(drone: str, name: str = "hall") -> Site:
-    """Two aisles of three nodes between the spurs at their ends, as this drone knows it."""
+def hall(drone: str, name: str = "hall", pad: str = "") -> Site:
+    """Two aisles of three nodes between the spurs at their ends, as this drone knows it; its own `pad` may be
+    at another node."""
+    at = PADS | ({drone: pad} if pad else {})
     pads = [
         Pad("home" if each == drone else f"pad-{each}", node, 0.5, charge=each == drone)
-        for each, node in PADS.items()
+        for each, node in at.items()
     ]
     aisles = [
         Aisle(aisle, 0.0, y_m, _STEPS_M, shelf_distance_m=1.2, shelf_height_m=2.5)
@@ -67,21 +69,26 @@ class PaperDrone:
         self.on_person: Callable[[], None] = lambda: None
         self.heard = self.sees = True
         self.counts = self.never_starts = False
+        self.refuses: dict[CommandKind, FlightdError] = {}
+        """Commands that have no effect, and how that shows."""
         self.plan = ""
+        self._plan_waits = False
         self._nodes: tuple[str, ...] = ()
-        self._session = 0
+        self._session = self._now_ns = 0
         self._events: list[EventReport] = []
         self._events_seq = itertools.count(1)
         self._seq = itertools.count(1)
         self.commands: list[str] = []
         self.truth = FleetDrone(name, 0, random.Random(0))
         self.way: list[str] = []
+        self._waits_before = 0
         self.begin_anew()
 
     def begin_anew(self, *, on_pad: bool = True) -> None:
         """Its daemon begins anew, believing to be on its pad."""
         self._session += 1
         self.phase, self.way, self.paused, self.left_s = Phase.PREFLIGHT, [], False, 900.0
+        self.waits = False
         self.ends_as = Phase.DONE
         self._timer_s = 0.0
         self._begins_in_air = self.truth.z_m > 0.0 and not on_pad
@@ -102,6 +109,11 @@ class PaperDrone:
         """Its own rules land it where it is."""
         self.phase, self._timer_s, self.way, self.ends_as = Phase.LAND, 0.0, [], Phase.ABORTED
 
+    def turn_home(self) -> None:
+        """Its battery, or an order, sends it home: nobody sends it anywhere any more."""
+        self.plan, self.paused = "", False
+        self._fly_over(self.way[:1], waits=False)
+
     # as DroneLink
 
     @property
@@ -111,6 +123,8 @@ class PaperDrone:
     async def act(self, act: Act, *, by_person: bool = True) -> Accepted:
         if by_person:
             self.on_person()
+        if act.command in self.refuses:
+            raise self.refuses[act.command]
         stays = self.never_starts and act.command is CommandKind.START
         if stays or act.command not in self._possible:
             raise RunError(f"{act.command} refused: not in phase {self.phase}")
@@ -120,14 +134,16 @@ class PaperDrone:
         match act.command:
             case CommandKind.START:
                 self.phase, self._timer_s = Phase.TAKE_OFF, 0.0
-                self.way = [*self._nodes, *self._home_from(self._nodes[-1])]
+                self._fly_over(self._nodes, waits=self._plan_waits)
+            case CommandKind.GOTO if self.waits_at == act.node == here and not act.waits:
+                self._fly_over([here], waits=False)
             case CommandKind.GOTO:
-                self.way = [here, act.node, *self._home_from(act.node)]
+                rests = self._is_at_end and self.phase is Phase.HOLD
+                self._fly_over([act.node] if rests else [here, act.node], waits=act.waits)
             case CommandKind.PAUSE | CommandKind.RESUME:
                 self.paused = act.command is CommandKind.PAUSE
             case CommandKind.HOME:
-                self.plan, self.paused = "", False  # nobody sends it anywhere any more
-                self.way = [here, *self._home_from(here)]
+                self.turn_home()
             case CommandKind.LAND | CommandKind.STOP:
                 self.come_down()
         return Accepted(version=1, request=act.id)
@@ -136,7 +152,7 @@ class PaperDrone:
         self, nodes: Sequence[str], levels: Sequence[int], order_id: str = "", **how: Any
     ) -> Planned:
         if not how.get("dry"):
-            self.plan, self._nodes = order_id, tuple(nodes)
+            self.plan, self._nodes, self._plan_waits = order_id, tuple(nodes), how.get("waits", False)
             self._event("command", "plan")
         way = (self.site.home.node, *nodes, self.site.home.node)
         return Planned(
@@ -153,12 +169,26 @@ class PaperDrone:
         """Fly until cancelled."""
         while True:
             await asyncio.sleep(STEP_S)
+            self._now_ns += round(STEP_S * 1e9)
             self._fly()
             heard_s = 0.0 if self.heard else 10.0
             self._tell(self.name, "link", LinkState(True, heard_s, 1.0, 0, True, self.flies, ""))
             if self.heard:
                 self._tell(self.name, "events", tuple(self._events))
                 self._tell(self.name, "status", self.status)
+
+    def _fly_over(self, nodes: Sequence[str], *, waits: bool) -> None:
+        home = self._home_from(nodes[-1])
+        self.way = [*nodes, *([nodes[-1]] if waits else []), *home]
+        self.waits, self._waits_before = waits, len(home)
+
+    @property
+    def _is_at_end(self) -> bool:
+        return self.waits and len(self.way) == self._waits_before + 1
+
+    @property
+    def waits_at(self) -> str:
+        return self.way[-self._waits_before - 1] if self.waits and self.way else ""
 
     def _home_from(self, node: str) -> list[str]:
         """Onto the pad: its node comes twice where the drone is there."""
@@ -173,7 +203,7 @@ class PaperDrone:
             case Phase.TAKE_OFF:
                 self.truth.z_m = 1.5
                 self._begin(Phase.FOLLOW)
-            case Phase.HOVER if self._holds:
+            case Phase.HOVER if self._holds or self._is_at_end:
                 self._begin(Phase.HOLD)
             case Phase.HOVER:
                 self._event("visited", self.way.pop(0))
@@ -182,7 +212,7 @@ class PaperDrone:
                 self._begin(Phase.HOLD)
             case Phase.FOLLOW:
                 self._go()
-            case Phase.HOLD if not self.paused:
+            case Phase.HOLD if not self.paused and not self._is_at_end:
                 self._begin(Phase.FOLLOW)
             case Phase.LAND:
                 self.truth.z_m = 0.0
@@ -210,7 +240,7 @@ class PaperDrone:
 
     def _event(self, name: str, text: str) -> None:
         seq = next(self._events_seq)
-        self._events.append(EventReport(1, "s", seq, seq, EventLevel.INFO, name, text))
+        self._events.append(EventReport(1, "s", seq, self._now_ns, EventLevel.INFO, name, text))
 
     def ordered_elsewhere(self, command: str) -> None:
         """Somebody at another station commands it."""
@@ -234,9 +264,10 @@ class PaperDrone:
         landed = "in_air" if armed else "on_ground"
         vehicle = VehicleReport("GUIDED", armed, True, landed, 0.0, 0.0, 0.9, 12.0, 0.0, 0.0, "")
         return StatusReport(
-            version=1, session=f"{self.name} {self._session}", seq=next(self._seq), stamp_ns=1,
+            version=1, session=f"{self.name} {self._session}", seq=next(self._seq), stamp_ns=self._now_ns,
             phase=self.phase, reason="", node="", goal=self.way[0] if self.way else "", nodes_done=0,
             nodes_planned=0, height_m=self.truth.z_m, position=at, lines=(), lines_age_s=0.0, vehicle=vehicle,
             frames=0, frames_dropped=0, fps=30.0, latency_ms={}, link=LinkReport(0, 0, 0, 0, 0),
             way=tuple(self.way), possible=self._possible, plan=self.plan, battery_left_s=self.left_s,
+            waits_at=self.waits_at,
         )  # fmt: skip

@@ -21,11 +21,11 @@ _SPEED = 5.0
 
 
 @pytest.mark.realtime(cores=0.8)
-def test_a_drone_comes_to_its_node_beside_one_that_a_person_took_and_one_that_fell_silent() -> None:
+def test_a_drone_visits_its_nodes_round_one_that_a_person_took_and_one_that_fell_silent() -> None:
     written: list[tuple[str, str, str, str]] = []
 
     async def go(flights: dict[str, LiveFlight]) -> None:
-        b, c = flights["b"], flights["c"]
+        a, b, c = (flights[name] for name in "abc")
         async with flown(flights, _SPEED, written) as fleet:
             await fleet.until_told("flies", lambda flies: flies)
             for drone, nodes in (("b", ["B3"]), ("c", ["B4"]), ("a", ["A3"])):
@@ -36,8 +36,11 @@ def test_a_drone_comes_to_its_node_beside_one_that_a_person_took_and_one_that_fe
             await until(lambda: b.phase is Phase.FOLLOW and b.at_m[0] > 2.1, 90)
             b.pace(0.5)  # it comes to B3 no sooner than the act to it
             assert (await fleet.station.act("b", id="by-ann-1", command="pause"))[0] == 200
-            await until(lambda: "A3" in fleet.passed["a"], 90)
-            await until(lambda: b.phase is Phase.HOLD, 30)
+            await fleet.until_told("done", lambda done: done == ["A3"])
+            await fleet.until_told("drones", lambda told: [n for n in told if told[n]["flown"]] == ["a"])
+            await until(lambda: a.phase is Phase.DONE, 120)
+            assert "A3" in fleet.passed["a"]
+            assert b.phase is Phase.HOLD
             assert (await fleet.ask("POST", "/api/fleet/stop"))[0] == 200
             await until(lambda: b.phase in {Phase.LAND, Phase.ABORTED}, 60)
             assert fleet.judge.faults == []

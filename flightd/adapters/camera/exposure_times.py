@@ -63,9 +63,12 @@ class ExposureTimes:
         return None if device_ns is None else self._by_device(device_ns, arrival_ns)
 
     def _by_device(self, device_ns: int, arrival_ns: int) -> int | None:
-        before_ns = self._clock.offset_ns
+        before_ns, begun = self._clock.offset_ns, self._clock.begun
         stamp_ns = self._clock.to_ours(device_ns, arrival_ns)
         offset_ns = self._clock.offset_ns
+        if self._clock.begun != begun:  # opened, or opened again
+            self._settled = 0
+            return None
         if stamp_ns is None or self._settled >= _SETTLED:
             return stamp_ns
         falls = before_ns is None or offset_ns is None or offset_ns < before_ns - _FALL_NS

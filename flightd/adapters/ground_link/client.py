@@ -170,10 +170,11 @@ class GroundClient:
         session: str | None = None,
         seen_ns: int | None = None,
         plan: str = "",
+        waits: bool = False,
     ) -> Accepted:
         """Give a command; sent again until it is answered, done once.  It is for the flight `session`, given
         by who saw the status of `seen_ns`; left out: this client's, and the newest that it heard.  A start
-        may name the `plan` that it is for."""
+        may name the `plan` that it is for; a goto that `waits` leads to a node to hold there."""
         order = Order(
             version=VERSION,
             id=order_id or _new_id(),
@@ -182,6 +183,7 @@ class GroundClient:
             plan=plan,
             session=self.session if session is None else session,
             seen_ns=self._seen_ns if seen_ns is None else seen_ns,
+            waits=waits,
         )
         return await self._ask(order, Accepted)
 
@@ -195,9 +197,10 @@ class GroundClient:
         dry: bool = False,
         session: str | None = None,
         seen_ns: int | None = None,
+        waits: bool = False,
     ) -> Planned:
-        """Hand a drone that stands disarmed the nodes of its next flight, or (`dry`) only ask what that would
-        be; the rest as `order`."""
+        """Hand a drone that stands disarmed the nodes of its next flight, at whose end it holds where it
+        `waits`, or (`dry`) only ask what that would be; the rest as `order`."""
         request = PlanFlight(
             version=VERSION,
             id=order_id or _new_id(),
@@ -207,6 +210,7 @@ class GroundClient:
             dry=dry,
             session=self.session if session is None else session,
             seen_ns=self._seen_ns if seen_ns is None else seen_ns,
+            waits=waits,
         )
         return await self._ask(request, Planned)
 

@@ -65,6 +65,7 @@ _TAKEN_OVER_NS = 3_000_000_000
 _URGENT = frozenset({CommandKind.LAND, CommandKind.STOP})
 """Never held back for being too many."""
 _NEVER_LATE = _URGENT | {CommandKind.PAUSE}
+_WAIT = frozenset({CommandKind.GOTO, CommandKind.PLAN})
 _LATE_NS = 5_000_000_000
 """By an older status nothing else is ordered: the order lay in a queue, or its giver saw nothing."""
 
@@ -193,7 +194,7 @@ class RequestHandler:
 
     def _order(self, order: Order, peer: Peer, now_ns: int) -> Answer:
         """Accept, refuse or repeat an order, and write down which."""
-        command = Command(order.id, order.command, order.node, plan=order.plan)
+        command = Command(order.id, order.command, order.node, plan=order.plan, waits=order.waits)
         repeated = self._repeated(command, peer)
         if repeated is not None:
             return repeated
@@ -231,7 +232,9 @@ class RequestHandler:
 
     def _plan_flight(self, request: PlanFlight, peer: Peer, now_ns: int) -> Answer:
         """What a flight over the nodes is, handed to the mission unless it is only asked for."""
-        command = Command(request.id, CommandKind.PLAN, nodes=request.nodes, levels=request.levels)
+        command = Command(
+            request.id, CommandKind.PLAN, nodes=request.nodes, levels=request.levels, waits=request.waits
+        )
         if not request.dry and (repeated := self._repeated(command, peer)) is not None:
             return repeated
         code, text = self._against_plan(request, peer, now_ns)
@@ -256,7 +259,10 @@ class RequestHandler:
             command=CommandKind.PLAN,
             session=request.session,
             seen_ns=request.seen_ns,
+            waits=request.waits,
         )
+        if request.waits and not request.nodes:
+            return Code.MALFORMED, "a plan that waits at its end has nodes"
         if self._plans is None:
             return Code.UNAVAILABLE, "no flight is planned here yet; ask again in a moment"
         if request.dry:  # planned between two ticks: not while it flies
@@ -312,6 +318,11 @@ class RequestHandler:
                 bool(order.plan) and kind is not CommandKind.START,
                 Code.MALFORMED,
                 "only start names the plan that it is for",
+            ),
+            (
+                order.waits and kind not in _WAIT,
+                Code.MALFORMED,
+                "only goto and a plan over nodes end by waiting",
             ),
             (
                 bool(node) and node not in self._nodes,

@@ -58,6 +58,7 @@ def status_report(snapshot: Snapshot, session: str, seq: int, link: LinkReport) 
         battery_left_s=finite(snapshot.outlook.battery_left_s),
         home_s=finite(snapshot.outlook.home_s),
         plan=snapshot.outlook.plan,
+        waits_at=snapshot.outlook.waits_at,
     )
 
 

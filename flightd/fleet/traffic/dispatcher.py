@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from flightd.fleet.traffic.distances import Distances
@@ -46,13 +46,15 @@ class Endurance:
 @dataclass(frozen=True, slots=True)
 class DroneReport:
     """What a drone tells: how many actions of its life are done, its charge, by how much its position is
-    doubted, and whether it is unable to fly on."""
+    doubted, and whether it is unable to fly on; `not_counted` has the nodes at which a count failed, and
+    why."""
 
     drone: str
     done: int
     charge: float
     doubt_m: float = 0.0
     failed: bool = False
+    not_counted: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ class Commands:
 
 class Dispatcher:
     """The fleet of one floor.  With `shares` no drone is given more than its part of what waits, for all that
-    could fly now."""
+    could fly now, and a step plans one tour at most: the next one follows soon."""
 
     def __init__(
         self, control: TrafficControl, queue: WorkQueue, endurance: Endurance, *, shares: bool = False
@@ -84,6 +86,9 @@ class Dispatcher:
         self._held: set[str] = set()
         self._tries: dict[str, int] = {}
         self._shut: dict[str, str] = {}
+        self._refusals: dict[str, int] = {}
+        self._blamed: dict[str, str] = {}
+        """The reasons of what drones refused: no air that is freed changes them."""
         self.holding = 0
 
     def step(self, now_ms: int, reports: Iterable[DroneReport]) -> Commands:
@@ -117,11 +122,20 @@ class Dispatcher:
             self._shut.pop(node, None)
         self.queue.retry(nodes)
 
-    def withdraw(self, drone: str, place: int, air: Collection[int], doubt_m: float, now_ms: int) -> None:
+    def withdraw(
+        self,
+        drone: str,
+        place: int,
+        air: Collection[int],
+        doubt_m: float,
+        now_ms: int,
+        refused: str = "",
+    ) -> None:
         """A drone is flown by somebody else, near `place` and anywhere in `air`, or so far beside:
         what it had to count is given to others, who fly round it (`TrafficControl.roam`).  Again whenever its
-        air has changed."""
-        before = self._near(drone)
+        air has changed.  `refused` is why it did not fly on; what it was on its way to count is given up for
+        that where nobody else may do it, or several have tried."""
+        before, next_node = self._near(drone), self._next_of(drone)
         self._held |= set(self.control.roam(drone, place, air, doubt_m, now_ms))
         self._held.discard(drone)
         self._avoided.discard(drone)
@@ -129,6 +143,8 @@ class Dispatcher:
         if lost := self._tours.pop(drone, set()):
             self._next_try_ms[drone] = now_ms + _RETRY_MS  # others first
             self.queue.hand_back(lost)
+        if refused and next_node in lost:
+            self._blame(next_node, drone, refused)
         self._settle_tours()
         self._free(before - self._near(drone))
 
@@ -145,11 +161,30 @@ class Dispatcher:
         self._free(freed)
         return True
 
+    def _next_of(self, drone: str) -> str:
+        """The node that it is to count next; empty where there is none."""
+        course = self.control.drones[drone]
+        counts = [action.vertex for action in course.base if action.act is Act.COUNT]
+        ahead = [*counts, *(stop.vertex for stop in course.stops)]
+        return self.control.lanes.vertices[ahead[0]].node if ahead else ""
+
+    def _blame(self, node: str, drone: str, why: str) -> None:
+        tries = self._refusals[node] = self._refusals.get(node, 0) + 1
+        if self.queue.work(node).drone or tries >= _TRIES:
+            self._refusals.pop(node)
+            self._give_up(node, f"{drone}: {why}")
+
+    def _give_up(self, node: str, reason: str) -> None:
+        self._blamed[node] = reason
+        self.queue.hand_back([node], reason)
+
     def _free(self, nodes: Collection[str]) -> None:
         """Drones may come there again."""
+        reasons = self.queue.reasons
+        freed = [node for node in nodes if node not in reasons or reasons[node] != self._blamed.get(node)]
         if nodes:
             self._tries.clear()
-            self.queue.retry(nodes)
+        self.queue.retry(freed)
 
     def _hear(self, report: DroneReport, now_ms: int) -> None:
         drone, course = report.drone, self.control.drones[report.drone]
@@ -157,12 +192,15 @@ class Dispatcher:
         self._heard_ms[drone] = now_ms
         if drone in self._avoided and not course.failed:
             counts = [action.vertex for action in course.base if action.act is Act.COUNT]
-            self.queue.retry(self._near(drone) - {self.control.lanes.vertices[c].node for c in counts})
+            self._free(self._near(drone) - {self.control.lanes.vertices[c].node for c in counts})
         vertices = self.control.lanes.vertices
         for vertex in self.control.done(drone, report.done, now_ms):
             node = vertices[vertex].node
             self._tours.get(drone, set()).discard(node)
-            self.queue.finish(node)
+            if node in report.not_counted:
+                self._give_up(node, f"{drone}: {report.not_counted[node]}")
+            else:
+                self.queue.finish(node)
         if course.failed:
             return
         self.control.doubt(drone, report.doubt_m, now_ms)
@@ -284,10 +322,14 @@ class Dispatcher:
     def _give_tours(self, now_ms: int) -> None:
         ready = [drone for drone in self.control.drones if self._may_begin(drone)]
         for i, drone in enumerate(ready):
-            due = self.queue.open and now_ms >= self._next_try_ms.get(drone, 0)
+            if not self.queue.open or now_ms < self._next_try_ms.get(drone, 0):
+                continue
             most = math.ceil(len(self.queue.open) / (len(ready) - i)) if self._shares else MOST_OF_TOUR
-            if due and not self._give_tour(drone, now_ms, min(most, MOST_OF_TOUR)):
+            plans = self.control.replans
+            if not self._give_tour(drone, now_ms, min(most, MOST_OF_TOUR)):
                 self._next_try_ms[drone] = now_ms + _RETRY_MS
+            if self._shares and self.control.replans > plans:
+                return
 
     def _may_begin(self, drone: str) -> bool:
         """Whether a drone has nothing to do, and a battery to do something."""

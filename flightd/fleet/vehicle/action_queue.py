@@ -45,6 +45,12 @@ class ActionQueue:
         tracked = self._all.get(action_id)
         return tracked is None or tracked.status.is_over
 
+    def failure_of(self, action_id: str) -> str | None:
+        """Why one failed, as far as that was told; None where it did not."""
+        tracked = self._all.get(action_id)
+        failed = tracked is not None and tracked.status is ActionStatus.FAILED
+        return (tracked.result or "") if tracked is not None and failed else None
+
     @property
     def runs(self) -> bool:
         """Whether one is going on."""

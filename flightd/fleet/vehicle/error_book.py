@@ -38,6 +38,10 @@ class ErrorBook:
             for one in self._told
         ]
 
+    def what(self, error: ErrorType) -> str:
+        """What is told of this kind, for people; empty where nothing is."""
+        return next((one.refusal.what for one in self._told if one.refusal.error is error), "")
+
     def order_refused(self, order: Order, refusal: Refusal) -> None:
         """Until an order is accepted."""
         about = (("orderId", order.order_id), ("orderUpdateId", str(order.order_update_id)))

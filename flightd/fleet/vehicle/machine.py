@@ -149,6 +149,20 @@ class Vehicle:
         """Whether an action of the order goes on no more, or is not known."""
         return self._actions.is_over_of(action_id)
 
+    def failure_of(self, action_id: str) -> str | None:
+        """Why an action of the order failed, as far as that was told; None where it did not."""
+        return self._actions.failure_of(action_id)
+
+    @property
+    def held_back(self) -> str:
+        """Why the drone stands though its base leads on: it would not come home.  Empty where it does not."""
+        return "" if self._commanded else self._errors.what(ErrorType.BASE_BEYOND_SAFE_RETURN)
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether it was told to stand until it may go on."""
+        return self._instant.pauses
+
     @property
     def is_idle(self) -> bool:
         """Whether no order is left to be flown or done."""

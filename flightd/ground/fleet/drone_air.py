@@ -73,8 +73,9 @@ class DroneAir:
         elif status.phase is Phase.PREFLIGHT and not self._flew:
             self._rest()
 
-    def close(self, ways: Sequence[Sequence[str]], doubt_m: float) -> None:
-        """It may be on these ways, over nodes, from where it was seen last, and on its way home."""
+    def close(self, ways: Sequence[Sequence[str]], doubt_m: float, *, holds: bool = False) -> None:
+        """It may be on these ways, over nodes, from where it was seen last, and on its way home.  How far
+        beside all that lessens only by what a drone tells that `holds`, and knows its place."""
         if self.rests:
             return
         floor = self._floor
@@ -83,7 +84,8 @@ class DroneAir:
         found = (floor.way(self._drone, (here, *way)) for way in ((), *ways))
         self.closed = self.closed.union([self.place], around, *found)
         self.place = floor.lanes.over(here)
-        self.doubt_m = max(self.doubt_m, doubt_m)
+        is_sure = holds and self._armed and bool(self.is_believed)
+        self.doubt_m = doubt_m if is_sure else max(self.doubt_m, doubt_m)
 
     def give_back(self) -> None:
         """A person says that on the ground it stands on its pad, and in the air it is where it tells."""

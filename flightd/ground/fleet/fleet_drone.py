@@ -3,12 +3,14 @@ what is released to it becomes an order, and what it tells becomes actions that 
 
 from __future__ import annotations
 
+import logging
 import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.dispatcher import DroneReport
@@ -21,9 +23,11 @@ from flightd.ground.fleet.drone_air import DroneAir
 from flightd.ground.fleet.fleet_floor import FleetFloor
 from flightd.ground.mqtt.managed_drone import ManagedDrone
 from flightd.ground.mqtt.order_flight import WAITS
+from flightd.ground.mqtt.safe_return import Standing
 from flightd.mission.machine import FLYING
 from flightd.site.site import Side
 
+_LOG = logging.getLogger(__name__)
 RESERVE: Final = 0.15
 FLIGHT_S: Final = 3600.0
 """The charge that traffic is told is the time that the drone itself expects to have left, in such flights."""
@@ -34,6 +38,8 @@ _DOUBTS_M: Final = 3.0
 _SIGMAS: Final = 3.0
 _CALLED_OFF_EVERY_S: Final = 2.0
 _STARTS_WITHIN_S: Final = 60.0
+_REFUSES_S: Final = 5.0
+"""What keeps a drone from going on for so long is told to traffic."""
 _IN_AIR: Final = frozenset({*FLYING, Phase.LAND, Phase.RECOVER})
 _CLIMBS: Final = frozenset({Phase.TAKE_OFF, Phase.ACQUIRE})
 
@@ -61,7 +67,12 @@ class FleetDrone:
         self._done = 0
         self._orders: BaseOrders | None = None
         self._refused = ""
-        self._paused = self._was_taken = False
+        self._refuses_since_s: float | None = None
+        self._not_counted: dict[str, str] = {}
+        self._checked: tuple[FloorStatus | None, Standing | None] = None, None
+        self.objection = ""
+        """Why it is not flown on this floor, by its map and where it stands."""
+        self._paused, self._was_taken = drone.vehicle.is_paused, False
         self._called_off_s = -math.inf
         self._stands_since_s = 0.0
         self.air = DroneAir(name, floor)
@@ -78,9 +89,14 @@ class FleetDrone:
         status = self.drone.status
         if status is None or not self.drone.is_heard or not self.drone.is_automatic or self._refused:
             return False
-        if self.air.is_astray or self.air.is_believed is False:
+        if self.objection or self.air.is_astray or self.air.is_believed is False:
             return False
         return status.phase not in FLYING or status.phase is Phase.RELOCATE or self._is_on_base(status)
+
+    @property
+    def refused(self) -> str:
+        """Why it does not fly on as it was released; empty where it does."""
+        return self._refused
 
     @property
     def why(self) -> str:
@@ -88,8 +104,8 @@ class FleetDrone:
         status, floor = self.drone.status, self.drone.floor
         if status is None or floor is None or not self.drone.is_heard:
             return "it is not heard"
-        if not self._floor.is_of(floor):
-            return f"it flies by another map: {floor.name}"
+        if self.objection:
+            return self.objection
         if self.air.is_astray:
             return "nothing shows that it stands on its pad; give it back once it does"
         if self.drone.is_taken or self.air.is_believed is False:
@@ -101,8 +117,8 @@ class FleetDrone:
     def _is_on_base(self, status: StatusReport) -> bool:
         """By what traffic released: who is paused on a lane has nothing ahead as a vehicle."""
         base = {self._node_of(step) for step in self._base}
-        vehicle, home = self.drone.vehicle, self._floor.pads[self.name].node
-        return not status.way or status.way[0] in base | {vehicle.last_node, *vehicle.ahead, home}
+        vehicle = self.drone.vehicle
+        return not status.way or status.way[0] in base | {vehicle.last_node, *vehicle.ahead}
 
     @property
     def waits(self) -> bool:
@@ -111,11 +127,15 @@ class FleetDrone:
         return status is not None and status.phase is Phase.PREFLIGHT and self.drone.is_automatic
 
     @property
+    def stands(self) -> bool:
+        """It waits on its pad, and has told where that is."""
+        return self.drone.is_heard and self.waits and self.air.rests and self.drone.standing is not None
+
+    @property
     def rests_at(self) -> int | None:
         """The vertex from which traffic may fly it on: it waits on its pad, or holds over a node."""
-        status, floor = self.drone.status, self.drone.floor
-        fits = floor is not None and self._floor.is_of(floor)
-        if status is None or not fits or not self.drone.is_heard or not self.drone.is_automatic:
+        status = self.drone.status
+        if status is None or self.objection or not self.drone.is_heard or not self.drone.is_automatic:
             return None
         if self.waits:
             return self._floor.pad(self.name) if self.air.rests else None
@@ -140,7 +160,8 @@ class FleetDrone:
         if self.waits and not self._base and not ready:
             charge = 0.0  # nobody sends it anywhere
         self.air.doubt_m = self._doubt_m(status)
-        return DroneReport(self.name, self._done, charge, self.air.doubt_m)
+        failed = dict(self._not_counted)
+        return DroneReport(self.name, self._done, charge, self.air.doubt_m, not_counted=failed)
 
     def _doubt_m(self, status: StatusReport | None) -> float:
         if status is None or status.phase in _CLIMBS or status.phase not in _IN_AIR:
@@ -153,8 +174,11 @@ class FleetDrone:
 
     def _see_done(self) -> None:
         while self._base and self._is_done(self._base[0]):
-            self._base.popleft()
+            step = self._base.popleft()
             self._done += 1
+            failure = self.drone.vehicle.failure_of(step.count)
+            if failure is not None:
+                self._not_counted[self._node_of(step)] = failure or "the count failed"
 
     def _is_done(self, step: _Step) -> bool:
         if step.action.act is Act.TAKE_OFF:
@@ -175,13 +199,41 @@ class FleetDrone:
         if self.air.is_astray and not was_astray:
             drone.taken_by_person()  # it lies where it is until he gives it back
         self._was_taken = drone.is_taken
+        self._check()
+
+    def _check(self) -> None:
+        """Its map and pad, whenever it may have others: after each start of its daemon."""
+        told = self.drone.floor, self.drone.standing
+        floor, standing = told
+        if floor is None or (floor is self._checked[0] and standing is self._checked[1]):
+            return
+        self._checked = told
+        stands_on = None if standing is None else standing.node
+        before, self.objection = self.objection, self._floor.objection(self.name, floor, stands_on)
+        if self.objection and self.objection != before:
+            _LOG.warning("%s is not flown: %s", self.name, self.objection)
+
+    @property
+    def closed_air(self) -> tuple[int, frozenset[int], float]:
+        """A place of it, what it may be on, and by how much beside: near its own pad and another one that it
+        tells."""
+        air, floor = self.air, self.drone.floor
+        if not self.objection or floor is None or not self._floor.is_of(floor):
+            return air.place, air.closed, air.doubt_m
+        over, beside_m = self._floor.beside(floor)
+        stands = (
+            () if self.drone.standing is None else self._floor.way(self.name, (self.drone.standing.node,))
+        )
+        return air.place, air.closed.union([over], stands), max(air.doubt_m, beside_m)
 
     def close_air(self) -> None:
         """Traffic does not fly it: it may be on all that it was released to, ordered, or tells, and near."""
         status, vehicle = self.drone.status, self.drone.vehicle
         told = () if status is None else status.way
         base = [self._node_of(step) for step in self._base]
-        self.air.close([(vehicle.last_node, *vehicle.ahead), told, base], self._doubt_m(status))
+        holds = self.drone.is_heard and status is not None and status.phase is Phase.HOLD
+        holds = holds and status is not None and status.position is not None
+        self.air.close([(vehicle.last_node, *vehicle.ahead), told, base], self._doubt_m(status), holds=holds)
 
     @property
     def way_home(self) -> frozenset[int]:
@@ -198,7 +250,8 @@ class FleetDrone:
     def begin(self) -> None:
         """Traffic flies it from now on, from where it rests; nothing of before is left."""
         self._base.clear()
-        self._done, self._orders, self._refused = 0, None, ""
+        self._done, self._orders, self._refused, self._refuses_since_s = 0, None, "", None
+        self._not_counted.clear()
         self.air.begin()
         self.drone.flies = self.drone.lands = False
         self.drone.has_more = True
@@ -221,7 +274,8 @@ class FleetDrone:
         if not self._base or not self.waits:
             self._stands_since_s = now_s
         elif now_s - self._stands_since_s >= _STARTS_WITHIN_S:
-            self._refused = "it does not start"
+            self._refused = f"it does not start: {self.drone.trouble}".removesuffix(": ")
+        self._see_refusal(now_s)
         self._base.extend(_Step(action) for action in released)
         if paused is not self._paused:
             self._pause(paused=paused)
@@ -229,6 +283,15 @@ class FleetDrone:
         lands = bool(self._base) and self._base[0].action.act is Act.LAND
         self.drone.lands = lands and not paused
         self.drone.flies = self._orders is not None and not paused
+
+    def _see_refusal(self, now_s: float) -> None:
+        """In the air; on the ground it may be ready a little later."""
+        if not self.drone.trouble or not self._base or self.waits:
+            self._refuses_since_s = None
+        elif self._refuses_since_s is None:
+            self._refuses_since_s = now_s
+        elif now_s - self._refuses_since_s >= _REFUSES_S:
+            self._refused = self.drone.trouble
 
     def _pause(self, *, paused: bool) -> None:
         self._paused = paused

@@ -91,6 +91,24 @@ class FleetFloor:
         """Whether a drone's map is this floor, but for pads."""
         return _without_pads(floor) == self._like
 
+    def objection(self, drone: str, floor: FloorStatus, stands_on: str | None) -> str:
+        """Why a drone that flies by its map `floor`, and stands beside that node, is not flown on this one;
+        empty where it is."""
+        if not self.is_of(floor):
+            return f"it flies by another map: {floor.name}"
+        try:
+            pad = own_pad(drone, floor, floor.home if stands_on is None else stands_on)
+        except InputError as err:
+            return str(err)
+        return "" if pad == self.pads[drone] else f"it has another pad than before: at {pad.node}"
+
+    def beside(self, floor: FloorStatus) -> tuple[int, float]:
+        """The vertex over the node that is nearest to the pad which a map calls home, and how far that is."""
+        homes = [pad for pad in floor.pads if node_of_pad(floor, pad) == floor.home]
+        at = (homes[0].x_m, homes[0].y_m) if homes else (0.0, 0.0)
+        nearest = self._nearest(at)
+        return self.lanes.over(nearest.node), math.dist((nearest.x_m, nearest.y_m), at)
+
     def pad(self, drone: str) -> int:
         """The vertex on a drone's pad."""
         return self.lanes.index[f"{_TO_PAD}{drone}"]
@@ -110,15 +128,27 @@ class FleetFloor:
         return self._nearest(at).node
 
     def around(self, at: tuple[float, float]) -> frozenset[int]:
-        """The lanes on which a drone may be that is not over a node; all at its nearest node where it is on
-        none."""
+        """The lanes on which a drone may be that is not over a node, not those that only end near it; all at
+        its nearest node where it is on none."""
         if self.node_at(at) is not None:
             return frozenset()
         first, boxes = len(self.lanes.vertices), self.lanes.boxes
         number = range(first, first + len(self.lanes.lanes))
         near = frozenset(i for i in number if _apart_m(boxes[i], at) <= _NEAR_M)
+        near = frozenset(i for i in near if self._leads_past(i, at)) or near
         over = self.lanes.over(self.nearest(at))
         return near or frozenset(arc.resource for arc in self.lanes.arcs[over])
+
+    def _leads_past(self, lane: int, at: tuple[float, float]) -> bool:
+        """Whether a place is further along a lane, from its nearer end, than it is beside it."""
+        ends = self.lanes.lanes[lane - len(self.lanes.vertices)]
+        a, b = self.lanes.vertices[ends.a], self.lanes.vertices[ends.b]
+        dx, dy, x_m, y_m = b.x_m - a.x_m, b.y_m - a.y_m, at[0] - a.x_m, at[1] - a.y_m
+        length_m = math.hypot(dx, dy)
+        if not length_m:
+            return False
+        along_m, beside_m = (x_m * dx + y_m * dy) / length_m, abs(x_m * dy - y_m * dx) / length_m
+        return min(along_m, length_m - along_m) >= beside_m
 
     def way(self, drone: str, nodes: Sequence[str]) -> frozenset[int]:
         """All the air of a way over these nodes and onto the drone's pad, by the shortest ways."""

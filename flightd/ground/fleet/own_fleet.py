@@ -5,20 +5,23 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import uuid
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, Final
 
 from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.types import CommandKind
 from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.work_queue import WorkQueue
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.fleet.base_orders import VERSION
 from flightd.ground.fleet.fleet_drone import FleetDrone
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor
-from flightd.ground.fleet.station_traffic import StationTraffic, pace_of
+from flightd.ground.fleet.station_traffic import Aside, StationTraffic, pace_of
 from flightd.ground.hub import Hub
 from flightd.ground.messages import Act
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
@@ -31,19 +34,32 @@ TRAFFIC: Final = Identity("fleet traffic", Role.OPERATOR, "local")
 _LOG = logging.getLogger(__name__)
 _STEP_S: Final = 0.25
 _AGAIN_S: Final = 5.0
+_FAILS_AGAIN_S: Final = 60.0
+"""If traffic fails so soon after it failed before, it does so over the work that waits."""
 
 
 class OwnFleet(VehicleSides):
     """The manager of the station's own drones; `run` is a task beside the hub's, `leave` ends it with
     everybody holding where he is."""
 
-    def __init__(self, drones: Iterable[str], measures: Measures, rules: OrderRules) -> None:
+    def __init__(
+        self,
+        drones: Iterable[str],
+        measures: Measures,
+        rules: OrderRules,
+        aside: Aside = asyncio.to_thread,
+    ) -> None:
         self._cell = CellSize(body_m=max(measures.length_m, measures.width_m), upright_m=WHOLE_AIR_M)
         super().__init__({name: ManagedDrone(name, VERSION, measures, rules) for name in drones})
         for drone in self._drones.values():
             drone.at_broker = True  # who gives the orders is always there
-        self._fleet: tuple[FleetFloor, dict[str, FleetDrone], Pace] | None = None
+        self._aside = aside
+        self._fleet: tuple[FleetFloor, Mapping[str, FleetDrone], Pace] | None = None
         self._traffic: StationTraffic | None = None
+        self._queue = WorkQueue(())
+        self._failed_s = -math.inf
+        self._compared: dict[str, FloorStatus] = {}
+        """The maps by which it was last tried to fly them."""
         self._trouble = ""
         self._hub: Hub | None = None
 
@@ -82,24 +98,41 @@ class OwnFleet(VehicleSides):
         loop = asyncio.get_running_loop()
         while True:
             try:
-                if self._traffic is None:
-                    self._assemble()
-                else:
-                    self._traffic.step(int(loop.time() * 1000))
+                await self._assemble()
+                if self._traffic is not None:
+                    await self._traffic.step(int(loop.time() * 1000), self._aside)
             except Exception as err:  # noqa: BLE001 - the station goes on; nobody is released to more
                 _LOG.error("the traffic of the fleet failed, and begins anew", exc_info=True)
                 self._traffic, self._trouble = None, f"it failed: {err}"
+                if loop.time() - self._failed_s < _FAILS_AGAIN_S:
+                    self._queue.hand_back([*self._queue.given, *self._queue.open], "traffic failed over it")
+                self._failed_s = loop.time()
                 for drone in self._drones.values():
                     drone.may_go_home = False  # nobody knows who is in its way
                 await asyncio.sleep(_AGAIN_S)
             await asyncio.sleep(_STEP_S)
 
-    def _assemble(self) -> None:
+    async def _assemble(self) -> None:
         """Once every drone has told its map and where it stands: nobody flies before, for each may be
         anywhere.  Where each may be is known on when traffic has failed."""
-        if self._fleet is not None:
-            self._traffic, self._trouble = StationTraffic(*self._fleet, self._cell), ""
-            return
+        if self._traffic is None and self._fleet is not None:
+            await self._begin(*self._fleet)
+        elif self._traffic is None or (self._traffic.is_outdated and self._is_told_anew):
+            await self._compare()
+        elif not self._traffic.is_outdated:
+            self._trouble = ""
+
+    async def _begin(self, floor: FleetFloor, drones: Mapping[str, FleetDrone], pace: Pace) -> None:
+        self._traffic, self._fleet = None, (floor, drones, pace)
+        made = partial(StationTraffic, floor, drones, pace, self._cell, self._queue)
+        self._traffic, self._trouble = await self._aside(made), ""
+
+    @property
+    def _is_told_anew(self) -> bool:
+        return any(drone.floor is not self._compared.get(name) for name, drone in self._drones.items())
+
+    async def _compare(self) -> None:
+        """Fly them by their maps and pads as they are told now; as before where that cannot be."""
         floors: dict[str, FloorStatus] = {}
         standings: dict[str, Standing] = {}
         for name, drone in self._drones.items():
@@ -108,21 +141,22 @@ class OwnFleet(VehicleSides):
         if missing := [name for name in self._drones if name not in floors]:
             self._trouble = f"{', '.join(missing)} did not tell yet where it stands on the ground"
             return
+        self._compared = floors
         stands = {name: standing.node for name, standing in standings.items()}
         try:
-            floor = FleetFloor(floors, stands, self._cell)
+            floor = await self._aside(partial(FleetFloor, floors, stands, self._cell))
         except InputError as err:
             if self._trouble != str(err):
-                _LOG.warning("the fleet does not fly: %s", err)
+                _LOG.warning(
+                    "the fleet %s: %s", "does not fly" if self._traffic is None else "flies on as before", err
+                )
             self._trouble = str(err)
             return
-        self._trouble = ""
         drones = {
             name: FleetDrone(name, drone, floor, self._cell.uncertainty_m)
             for name, drone in self._drones.items()
         }
-        self._fleet = floor, drones, pace_of(standings.values())
-        self._traffic = StationTraffic(*self._fleet, self._cell)
+        await self._begin(floor, drones, pace_of(standings.values()))
 
     # what is asked of it
 
@@ -138,7 +172,14 @@ class OwnFleet(VehicleSides):
     def document(self) -> dict[str, Any]:
         """How it is, as JSON has it."""
         told = {} if self._traffic is None else self._traffic.document()
-        return {"flies": self._traffic is not None, "trouble": self._trouble, **told}
+        asked = () if self._traffic is None else self._traffic.asked
+        work = {
+            "open": [*self._queue.open, *asked],
+            "given": dict(self._queue.given),
+            "done": list(self._queue.done),
+            "not_done": dict(self._queue.reasons),
+        }
+        return {"flies": self._traffic is not None, "trouble": self._trouble, **told, **work}
 
 
 async def stop_all(hub: Hub) -> dict[str, str]:

@@ -6,12 +6,15 @@ flown by somebody else: the air of its way is closed until it rests where traffi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final, Protocol, TypeAlias, TypeVar
 
 from flightd.core.errors import InputError
 from flightd.fleet.traffic.cells import CellSize
-from flightd.fleet.traffic.dispatcher import Dispatcher, Endurance
+from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport, Endurance
+from flightd.fleet.traffic.plan import Action
 from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.traffic.work_queue import NodeWork, Value, WorkQueue
 from flightd.ground.fleet.fleet_drone import FLIGHT_S, RESERVE, FleetDrone
@@ -22,6 +25,9 @@ from flightd.mission.plan.leg_times import Pace
 _LEAST_S: Final = 60.0
 """A drone with less time left in the air is given nothing."""
 _ENDURANCE: Final = Endurance(FLIGHT_S, FLIGHT_S, RESERVE, RESERVE + _LEAST_S / FLIGHT_S)
+Air: TypeAlias = tuple[int, frozenset[int], float]
+"""A place of a drone, all that it may be on, and by how much beside."""
+_T = TypeVar("_T")
 _SLOWEST_MPS, _FASTEST_MPS = 0.1, 1.0
 
 
@@ -32,22 +38,68 @@ def pace_of(standings: Iterable[Standing]) -> Pace:
     return Pace(HEIGHT_M, 0.5, 0.5, speed_mps, 0.5, 0.8, 1.5, 0.5, 3.0, 6.0, 6.0)
 
 
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A drone as a step begins: its `report` where traffic flies it, the rest where it does not."""
+
+    report: DroneReport | None
+    air: Air = (0, frozenset(), 0.0)
+    rests_at: int | None = None
+    way_home: frozenset[int] = frozenset()
+    refused: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Decided:
+    """What follows: the released, who stands, who may fly home, who is flown on."""
+
+    base: Mapping[str, Sequence[Action]]
+    paused: frozenset[str]
+    clear: Mapping[str, bool]
+    back: frozenset[str]
+
+
+class Aside(Protocol):
+    """Does a piece of work that takes a while, beside the loop."""
+
+    def __call__(self, work: Callable[[], _T], /) -> Awaitable[_T]: ...
+
+
 class StationTraffic:
-    """`step` it often.  It takes the drones one by one, where each rests."""
+    """`step` it often.  It takes the drones one by one, where each rests; what the `queue` has given before
+    waits again."""
 
     def __init__(
-        self, floor: FleetFloor, drones: Mapping[str, FleetDrone], pace: Pace, cell: CellSize
+        self,
+        floor: FleetFloor,
+        drones: Mapping[str, FleetDrone],
+        pace: Pace,
+        cell: CellSize,
+        queue: WorkQueue,
     ) -> None:
         self._floor = floor
         self._drones = drones
         self._control = TrafficControl(floor.lanes, pace, cell)
-        self._queue = WorkQueue(())
+        self._queue = queue
+        queue.hand_back([*queue.given])
+        gone = [node for node in queue.open if node not in floor.lanes.column_of]
+        queue.hand_back(gone, "the drones' map has it no more")
         self._dispatcher = Dispatcher(self._control, self._queue, _ENDURANCE, shares=True)
         self._dwell_ms = int(pace.dwell_s * 1000)
         self._flown: set[str] = set()
-        self._airs: dict[str, tuple[int, frozenset[int], float]] = {}
+        self._airs: dict[str, Air] = {}
+        self._asked: dict[str, NodeWork] = {}
+        self._decides = False
+        self._told: dict[str, Any] = {}
         for name in drones:
             self._control.enter(name, floor.pad(name))
+
+    @property
+    def is_outdated(self) -> bool:
+        """A drone has another map or pad than before, and all rest: who was told what it flies by begins
+        anew."""
+        drones = self._drones.values()
+        return any(drone.objection for drone in drones) and all(drone.stands for drone in drones)
 
     @property
     def flown(self) -> frozenset[str]:
@@ -59,44 +111,85 @@ class StationTraffic:
         lacks."""
         if unknown := [node for node in nodes if node not in self._floor.lanes.column_of]:
             raise InputError(f"no node is called {unknown[0]}")
-        self._queue.ask(
-            NodeWork(node.id, node.aisle, i, (), self._dwell_ms, Value.ASKED, drone=drone)
+        self._asked |= {
+            node.id: NodeWork(node.id, node.aisle, i, (), self._dwell_ms, Value.ASKED, drone=drone)
             for i, node in enumerate(self._floor.nodes)
             if node.id in nodes
-        )
+        }
+        if not self._decides:
+            self._take_asked()
 
-    def step(self, now_ms: int) -> None:
-        """Once round."""
+    def _take_asked(self) -> None:
+        self._queue.ask(self._asked.values())
+        self._asked.clear()
+
+    async def step(self, now_ms: int, aside: Aside) -> None:
+        """Once round.  Whatever plans is done `aside`, by how the drones were before; who is not any more as
+        he was then is left to the next step."""
+        seen = {name: self._see(name, drone) for name, drone in self._drones.items()}
+        self._told, self._decides = self._document(), True
+        try:
+            decided = await aside(partial(self._decide, seen, now_ms))
+        finally:
+            self._decides = False
+            self._take_asked()
         for name, drone in self._drones.items():
-            drone.look()
-            if name in self._flown and not drone.is_ours:
-                self._flown.discard(name)
-            if name not in self._flown:
-                self._lead_back(name, drone, now_ms)
-        reports = [self._drones[name].report() for name in sorted(self._flown)]
-        commands = self._dispatcher.step(now_ms, reports)
-        doubting = {report.drone for report in reports if report.doubt_m > 0.0}
-        for name in self._flown:
-            paused = name in commands.paused - doubting  # who looks for his place stands by himself
-            self._drones[name].fly(commands.base.get(name, ()), now_ms / 1000, paused=paused)
+            self._act(name, drone, seen[name], decided, now_ms / 1000)
 
-    def _lead_back(self, name: str, drone: FleetDrone, now_ms: int) -> None:
-        """Keep others out of a drone's air until it rests, and then fly it again."""
+    def _see(self, name: str, drone: FleetDrone) -> _Seen:
+        drone.look()
+        refused = drone.refused if name in self._flown else ""
+        if not drone.is_ours:
+            self._flown.discard(name)
+        if name in self._flown:
+            return _Seen(report=drone.report())
         drone.close_air()
-        air = drone.air.place, drone.air.closed, drone.air.doubt_m
-        if self._airs.get(name) != air:
-            self._airs[name] = air
-            self._dispatcher.withdraw(name, *air, now_ms)
-        drone.call_off(now_ms / 1000)
-        drone.drone.may_go_home = self._control.is_clear(name, drone.way_home)
-        rests_at = drone.rests_at
-        if rests_at is not None and self._dispatcher.readmit(name, rests_at, self._floor.pad(name), now_ms):
-            del self._airs[name]
+        return _Seen(None, drone.closed_air, drone.rests_at, drone.way_home, refused)
+
+    def _decide(self, seen: Mapping[str, _Seen], now_ms: int) -> _Decided:
+        """Keep others out of the air of those that traffic does not fly until each rests, and fly it on
+        then; send on the others."""
+        clear: dict[str, bool] = {}
+        back: set[str] = set()
+        for name, one in seen.items():
+            if one.report is not None:
+                continue
+            if self._airs.get(name) != one.air:
+                self._airs[name] = one.air
+                self._dispatcher.withdraw(name, *one.air, now_ms, one.refused)
+            clear[name] = self._control.is_clear(name, one.way_home)
+            pad = self._floor.pad(name)
+            if one.rests_at is not None and self._dispatcher.readmit(name, one.rests_at, pad, now_ms):
+                del self._airs[name]
+                back.add(name)
+        reports = [seen[name].report for name in sorted(seen)]
+        told = [report for report in reports if report is not None]
+        commands = self._dispatcher.step(now_ms, told)
+        doubting = {report.drone for report in told if report.doubt_m > 0.0}
+        # who looks for his place stands by himself
+        return _Decided(commands.base, commands.paused - doubting, clear, frozenset(back))
+
+    def _act(self, name: str, drone: FleetDrone, seen: _Seen, decided: _Decided, now_s: float) -> None:
+        drone.look()
+        if seen.report is None:
+            drone.call_off(now_s)
+            drone.drone.may_go_home = decided.clear[name]
+        if name in decided.back and drone.rests_at == seen.rests_at:
             drone.begin()
             self._flown.add(name)
+        if name in self._flown and (seen.report is None or drone.is_ours):
+            drone.fly(decided.base.get(name, ()), now_s, paused=name in decided.paused)
 
     def document(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """As JSON has it; while a step is decided, as it was before."""
+        return self._told if self._decides else self._document()
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """What was asked for since the step in hand began."""
+        return tuple(self._asked)
+
+    def _document(self) -> dict[str, Any]:
         lanes = self._control.lanes
         return {
             "drones": {
@@ -109,8 +202,4 @@ class StationTraffic:
                 }
                 for name, course in self._control.drones.items()
             },
-            "open": list(self._queue.open),
-            "given": dict(self._queue.given),
-            "done": list(self._queue.done),
-            "not_done": dict(self._queue.reasons),
         }

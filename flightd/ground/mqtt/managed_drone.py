@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import uuid
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -47,6 +47,7 @@ from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
 from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
 from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
+from flightd.ground.mqtt.sent_commands import SentCommands
 from flightd.ground.mqtt.shelf_counts import ShelfCounts, levels_of
 
 _LOG = logging.getLogger(__name__)
@@ -117,14 +118,14 @@ class ManagedDrone:
         """Messages that came faster than they were taken."""
         self._link: DroneLink | None = None
         self._taken = False
-        self._sent: Counter[str] = Counter()
+        self._sent = SentCommands()
         self._event_seq: int | None = None
         self._standing: Standing | None = None
         self._asked_at_s = -_ASK_AGAIN_S
         self._return = SafeReturn()
         self._acting: asyncio.Task[None] | None = None
         self._did: tuple[Next, float, int] = (None, 0.0, 0)
-        """The last act, when, and the status by which it shows."""
+        """The last act, when it was answered, and the status by which it shows."""
         self._order: Order | None = None
         self._ahead: list[str] = []
         self._counts = ShelfCounts()
@@ -154,6 +155,12 @@ class ManagedDrone:
     def standing(self) -> Standing | None:
         """What it told of itself before its start."""
         return self._standing
+
+    @property
+    def trouble(self) -> str:
+        """What keeps it from going on with its order, as long as it does: what it refuses, or is not sent
+        to."""
+        return self.vehicle.held_back if self._trouble is None else self._trouble[1]
 
     @property
     def floor(self) -> FloorStatus | None:
@@ -210,12 +217,14 @@ class ManagedDrone:
     def _take_event(self, event: EventReport) -> None:
         if event.name == "visited":
             self._counts.note_visit(event)
+        act = self._did[0]
+        if isinstance(act, CommandNext) and act.node and event.level is EventLevel.WARNING:
+            refused = event.name == "command" and event.text.startswith(f"{act.kind} {act.node} refused")
+            self._trouble = (ErrorType.NODE_UNREACHABLE, event.text) if refused else self._trouble
         is_command = event.name == "command" and event.level is EventLevel.INFO
-        if is_command and event.text.split(" ")[0] in _COMMANDS:
-            if self._sent[event.text]:
-                self._sent[event.text] -= 1
-            else:
-                self.taken_by_person()
+        is_command = is_command and event.text.split(" ")[0] in _COMMANDS
+        if is_command and not self._sent.take(event):
+            self.taken_by_person()
 
     # what goes on
 
@@ -344,8 +353,9 @@ class ManagedDrone:
                     ErrorType.NODE_UNREACHABLE,
                     f"the drone was halted on its way to {act.towards}",
                 )
-            elif act is not None and self._is_due(act, status, now_s):
-                self._did = act, now_s, status.seq + 2
+            elif act is None:
+                self._trouble = None
+            elif self._is_due(act, status, now_s):
                 self._acting = tasks.create_task(self._do(act, status, link), name=f"{self._name} is sent on")
 
     def _is_due(self, act: Next, status: StatusReport, now_s: float) -> bool:
@@ -387,7 +397,7 @@ class ManagedDrone:
             self._plans.append(act_id)
         else:
             text = f"{act.kind} {act.node}".rstrip()
-        self._sent[text] += 1
+        self._sent.note(text, status.stamp_ns)
         refused = ""
         try:
             if isinstance(act, PlanNext):
@@ -397,19 +407,22 @@ class ManagedDrone:
                     act_id,
                     session=status.session,
                     seen_ns=status.stamp_ns,
+                    waits=status.waits_at is not None,
                     by_person=False,
                 )
                 self._planned, self._counts.levels = (act_id, act.nodes), levels
             else:
                 plan = self._planned[0] if act.kind is CommandKind.START and self._planned else ""
-                order = Act(act_id, act.kind, act.node, plan, status.session, status.stamp_ns)
+                order = Act(act_id, act.kind, act.node, plan, status.session, status.stamp_ns, act.waits)
                 await link.act(order, by_person=False)
-            self._trouble = None
+            self._trouble = self._trouble if act == self._did[0] else None
         except FlightdError as err:
             refused = str(err).removeprefix("refused: ")
             self._trouble = ErrorType.NODE_UNREACHABLE, refused
             if isinstance(err, RunError):
-                self._sent[text] -= 1
+                self._sent.refused(text)
+        newest = status if self._status is None else self._status
+        self._did = act, asyncio.get_running_loop().time(), newest.seq + 2
         detail = ", ".join(act.nodes) if isinstance(act, PlanNext) else ""
         self._write_down(f"{text} {detail}".rstrip(), refused)
 

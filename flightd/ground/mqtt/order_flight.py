@@ -1,9 +1,12 @@
 """How an order is flown over the ground link: what is asked of the drone next, by its newest status.  Pure.
 
 A plan is handed over on the ground and started.  In the air the link extends no plan: the drone is sent on
-from node to node by `goto`, always before it is done with the node that it is at or makes for, for a drone
-with nothing ahead flies home.  So it has, after each node, either the next one of the base or the same one
-again, and there it is paused.  A station that dies thus leaves a drone that holds, or flies home by itself.
+from node to node by `goto`.  Every plan and goto of an order ends by holding there (`waits`), so that a drone
+which is done with its base before more of it comes waits for that, however late it comes and whatever became
+of the station.
+
+A daemon before that kind of end flies home with nothing ahead: it is given, before it is done with each node,
+either the next one of the base or the same one again, and there it is paused.
 """
 
 from __future__ import annotations
@@ -44,10 +47,11 @@ class PlanNext:
 
 @dataclass(frozen=True, slots=True)
 class CommandNext:
-    """Give a command; `node` only with goto."""
+    """Give a command; `node` only with goto, and so is whether the drone `waits` there."""
 
     kind: CommandKind
     node: str = ""
+    waits: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +66,8 @@ Next = PlanNext | CommandNext | Stuck | None
 
 def reached(status: StatusReport, wish: Wish) -> str | None:
     """The node ahead at which the drone has arrived."""
-    there = status.phase in AT_NODE and status.goal != wish.last and status.goal in wish.ahead
-    return status.goal if there else None
+    there = status.phase in AT_NODE or _is_at_end(status)
+    return status.goal if there and status.goal != wish.last and status.goal in wish.ahead else None
 
 
 def next_act(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, ...]] | None) -> Next:
@@ -88,8 +92,11 @@ def _on_ground(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, 
 
 
 def _in_air(status: StatusReport, wish: Wish) -> Next:
-    goal, following = status.way[0], status.way[1] if len(status.way) > 2 else ""  # the last one is its pad
+    at_end = _is_at_end(status)
+    goal, following = status.way[0], "" if at_end else _following(status)
     if wish.lands and not wish.ahead and {*status.way} == {wish.last}:
+        if status.waits_at:
+            return CommandNext(CommandKind.GOTO, wish.last)  # home from there: onto its pad
         return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD else None
     if goal == wish.last:
         wanted = wish.ahead[0] if wish.ahead else goal
@@ -97,11 +104,23 @@ def _in_air(status: StatusReport, wish: Wish) -> Next:
         wanted = (*wish.ahead, goal)[wish.ahead.index(goal) + 1]
     else:
         return _off_way(status, wish, goal)
-    if following != wanted:
-        return CommandNext(CommandKind.GOTO, wanted)
+    ends = goal == wanted == status.waits_at
+    waits = at_end and status.phase is Phase.HOLD
+    if (following != wanted and not ends) or (waits and wish.works):  # it is to be visited once more
+        return CommandNext(CommandKind.GOTO, wanted, waits=status.waits_at is not None)
     if wish.ahead or wish.works:
-        return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD else None
-    return CommandNext(CommandKind.PAUSE) if status.phase in AT_NODE else None
+        return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD and not waits else None
+    return CommandNext(CommandKind.PAUSE) if status.phase in AT_NODE and not ends else None
+
+
+def _following(status: StatusReport) -> str:
+    """The node after its goal; empty where only its pad is left."""
+    return status.way[1] if len(status.way) > 2 else ""
+
+
+def _is_at_end(status: StatusReport) -> bool:
+    """Whether the drone has visited the last node of its way: it holds there, or is about to."""
+    return bool(status.way) and status.way[0] == status.waits_at != _following(status)
 
 
 def _off_way(status: StatusReport, wish: Wish, goal: str) -> Next:

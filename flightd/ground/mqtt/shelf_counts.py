@@ -45,7 +45,7 @@ class ShelfCounts:
     @property
     def go_on(self) -> bool:
         """One goes on that a pause would interrupt."""
-        return any(not count.held for count in self._counts.values())
+        return any(not count.held and not count.seen for count in self._counts.values())
 
     def begin(
         self, action: Action, node: str, status: StatusReport, standing: Standing | None

@@ -110,6 +110,8 @@ class PhaseProgress:
             return done, Trigger.VIEW_DONE if more else over
         if due:
             return True, Trigger.SCAN_DUE
+        if goal.waits and not returning:
+            return self.phase_s(s.now_ns) >= self._params.dwell_s, Trigger.AWAITS_MORE
         dwelt = not goal.visit or returning or scan.is_scanned(goal) or bool(scan.legs)
         last = goal.sweep is not None and goal.sweep.last and not returning
         dwell_s = _READING_S if last else 0.0 if dwelt else self._params.dwell_s

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from flightd.config.mission import Heading
 from flightd.config.schema import Config
@@ -41,7 +41,7 @@ class HeadingPolicy:
 class Stop:
     """A node to stop at.  `yaw_rad` is flown from the stop before up to here; `visit` says that the node
     is one of the wanted ones (dwell, scan), not just a corner on the way; `sweep` is what is flown past on
-    the way to it."""
+    the way to it; `waits`: it holds there until it is told where to fly on."""
 
     node: str
     x_m: float
@@ -49,6 +49,7 @@ class Stop:
     yaw_rad: float
     visit: bool
     sweep: SweepLeg | None = None
+    waits: bool = False
 
     @property
     def speed_mps(self) -> float:
@@ -71,6 +72,11 @@ class FlightPlan:
         return sum(stop.visit for stop in self.stops)
 
     @property
+    def waits(self) -> bool:
+        """It ends by holding at its last visit, not at home."""
+        return any(stop.waits for stop in self.stops)
+
+    @property
     def nodes(self) -> int:
         """Nodes that are visited, each counted once."""
         return len({stop.node for stop in self.stops if stop.visit})
@@ -85,9 +91,10 @@ def make_plan(
     start_yaw_rad: float = 0.0,
     *,
     in_need: bool = False,
+    waits: bool = False,
 ) -> FlightPlan:
     """Plan a flight from `start` over `visits` in the given order to `home`, along open painted lines;
-    `in_need` one-way lines count as open both ways.
+    `in_need` one-way lines count as open both ways; it `waits` at the last visit before it flies home.
 
     Corners on the way become stops of their own.  Raises InputError for a node that the site lacks or to
     which no open way leads.
@@ -97,6 +104,8 @@ def make_plan(
     stops: list[Stop] = []
     here, yaw = start, start_yaw_rad
     for goal, visit in [*((node, True) for node in visits), (home, False)]:
+        if waits and not visit:
+            stops.append(replace(_stop(site, here, yaw, visit=False), waits=True))
         path = site.path(here, goal, against_one_way=in_need)
         for i, node in enumerate(path[1:], start=1):
             corner = i + 1 < len(path) and not _straight(site, path[i - 1], node, path[i + 1])

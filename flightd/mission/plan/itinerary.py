@@ -42,12 +42,14 @@ class Itinerary:
         """The node on which the drone stands before it flies, and its heading there."""
         self.visited: list[str] = []
         self._run: tuple[str, ...] = ()
+        self._waits = plan.waits
         self.wanted: Callable[[str], bool] = lambda _node: False
         """Whether anything is left to count at a node."""
 
     def begin(self, plan: FlightPlan) -> None:
         """Fly this plan instead, on the ground: from the same pad, before anything was visited."""
         self._stops, self._next, self._run = list(plan.stops), 0, ()
+        self._waits = plan.waits
 
     @property
     def goal(self) -> Stop:
@@ -98,6 +100,12 @@ class Itinerary:
     def way(self) -> tuple[str, ...]:
         """The nodes that are flown over next, the goal first; those far ahead are left out."""
         return tuple(stop.node for stop in self._stops[self._next : self._next + _WAY_SHOWN])
+
+    @property
+    def waits_at(self) -> str:
+        """The node ahead where it will hold, or holds, until it is told where to fly on; empty: it flies
+        home."""
+        return next((stop.node for stop in self._stops[self._next :] if stop.waits), "")
 
     @property
     def left_over(self) -> tuple[str, ...]:
@@ -181,9 +189,11 @@ class Itinerary:
         """From a stop over the visits home; against one-way lines where there is no legal way."""
         ends, yaw_rad = (here.node, self._home), here.yaw_rad
         try:
-            return make_plan(self._site, visits, *ends, self._policy, yaw_rad)
+            return make_plan(self._site, visits, *ends, self._policy, yaw_rad, waits=self._waits)
         except NoWayError:
-            return make_plan(self._site, visits, *ends, self._policy, yaw_rad, in_need=True)
+            return make_plan(
+                self._site, visits, *ends, self._policy, yaw_rad, in_need=True, waits=self._waits
+            )
 
     def _sweep_stop(self, leg: SweepLeg) -> Stop:
         at = self._site.nodes[leg.end]
@@ -204,16 +214,21 @@ class Itinerary:
         except NoWayError:
             self._replan([], in_need=True, home=pad)
 
-    def go_to(self, now_ns: int, node: str) -> None:
-        """Fly over `node` home, as ordered; an order that cannot be followed changes nothing."""
+    def go_to(self, now_ns: int, node: str, *, waits: bool = False, halted: bool = False) -> None:
+        """Fly over `node` home, as ordered, or hold there (`waits`): an order to fly home from where it would
+        hold flies home.  One that cannot be followed changes nothing.  `halted`: it begins its leg anew."""
         if node not in self._site.nodes:
             why = f"no node {node!r} on site {self._site.name}"
         else:
+            holds = self.goal.waits
+            ends = not waits and self.goal.node == node == self.waits_at
             try:
-                self._replan([node])
+                self._replan([] if ends else [node], waits=waits)
             except NoWayError as err:
                 why = f"goto {node} refused: {err}"
             else:
+                self._waits = waits
+                self._next += holds and halted  # it is there already
                 return
         self._events.report(now_ns, EventLevel.WARNING, "command", why)
 
@@ -251,7 +266,8 @@ class Itinerary:
             left = (stop.node for stop in self._stops[self._next :] if stop.visit)
             nodes = [*due, *(node for node in self._run_left if node not in due), *left]
             try:
-                rest = make_plan(self._site, nodes, due[0], self._home, self._policy, self.goal.yaw_rad)
+                ends, yaw_rad = (due[0], self._home), self.goal.yaw_rad
+                rest = make_plan(self._site, nodes, *ends, self._policy, yaw_rad, waits=self._waits)
             except NoWayError as err:
                 self._events.report(
                     now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} left out: {err}"
@@ -268,14 +284,18 @@ class Itinerary:
         """Stand on the pad that was flown to, with what was left over ahead."""
         pad = self.goal
         self.stand = (pad.node, pad.yaw_rad)
-        rest = make_plan(self._site, self._left_over, pad.node, self._home, self._policy, pad.yaw_rad)
+        ends, yaw_rad = (pad.node, self._home), pad.yaw_rad
+        rest = make_plan(self._site, self._left_over, *ends, self._policy, yaw_rad, waits=self._waits)
         self._stops, self._next = list(rest.stops), 0
         text = f"{len(self._left_over)} stops left; change the battery on the pad at {pad.node}"
         self._events.report(now_ns, EventLevel.WARNING, "swap", text)
         self._left_over = ()
 
-    def _replan(self, visits: list[str], *, in_need: bool = False, home: str | None = None) -> None:
-        """Finish the present leg, then fly over `visits` home.  NoWayError leaves everything as it is."""
+    def _replan(
+        self, visits: list[str], *, in_need: bool = False, home: str | None = None, waits: bool = False
+    ) -> None:
+        """Finish the present leg, then fly over `visits` home, or hold at the last of them.  NoWayError
+        leaves everything as it is."""
         here = self.goal
         onward = make_plan(
             self._site,
@@ -285,8 +305,9 @@ class Itinerary:
             self._policy,
             here.yaw_rad,
             in_need=in_need,
+            waits=waits,
         )
-        self._stops[self._next + 1 :] = onward.stops
+        self._stops[self._next :] = [replace(here, waits=False), *onward.stops]
         self._run = ()
 
 

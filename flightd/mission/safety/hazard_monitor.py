@@ -26,6 +26,10 @@ _NEWS_S = 1.0
 """Something that was replaced is news for so long."""
 _CLOCK_S = 0.3
 """So soon clocks are compared anew after a reboot or a jump."""
+_CLIMBS_UNSEEING_S = 1.0
+"""So long a take-off, which hardly steers, goes on without a picture, or with the same one."""
+_OFF_FLOOR_M = 0.5
+"""Below, a picture may well stay the same: of the pad itself, packed so that its noise is gone."""
 _JUMPED = 2
 """So many attitudes with a senseless time are no stray datagram."""
 
@@ -44,6 +48,7 @@ class FlightContext:
     leg_along_x: bool | None
     holds: bool = False
     at_height: bool = True
+    takes_off: bool = False
 
 
 class Counted:
@@ -85,7 +90,7 @@ class HazardMonitor:
         if s.vehicle is not None:
             found |= self._authority(s, s.vehicle) if situation.airborne else set()
             conditions |= self._vehicle(s, s.vehicle)
-        conditions |= self._pictures(s) | self._place(s)
+        conditions |= self._pictures(s, situation) | self._place(s)
         for trigger, (present, tolerated_s) in conditions.items():
             holds = present and situation.airborne
             if self._debounce[trigger].step(holds, s.now_ns) >= tolerated_s and holds:
@@ -145,10 +150,14 @@ class HazardMonitor:
             Trigger.RECORDER_DEAD: (self._writers.step(health.recorder_restarts, s.now_ns), 0.0),
         }
 
-    def _pictures(self, s: MissionInputs) -> _Conditions:
+    def _pictures(self, s: MissionInputs, situation: FlightContext) -> _Conditions:
         tolerated_s, w = self._params.lines_hold_s, s.warnings
+        may_repeat = False
+        if situation.takes_off:
+            tolerated_s = max(tolerated_s, _CLIMBS_UNSEEING_S)
+            may_repeat = w.blank_s > 0.0 or not s.height_m > _OFF_FLOOR_M
         return {
-            Trigger.CAMERA_FROZEN: (w.frozen_s > tolerated_s, 0.0),
+            Trigger.CAMERA_FROZEN: (w.frozen_s > tolerated_s and not may_repeat, 0.0),
             Trigger.CAMERA_BLIND: (w.blank_s > tolerated_s, 0.0),
             Trigger.FRAMES_STALE: (w.frame_age_s > tolerated_s, 0.0),
         }

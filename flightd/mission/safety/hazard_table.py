@@ -286,7 +286,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.CAMERA_FROZEN,
         "the same picture for `mission.lines_hold_s`; a repeated one is never used",
         Action.HOLD,
-        _BLIND,
+        _BLIND + "; a take-off lands",
         _FAST,
     ),
     Hazard(
@@ -302,7 +302,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.FRAMES_STALE,
         "newest picture exposed more than `mission.lines_hold_s` ago",
         Action.HOLD,
-        _BLIND + "; the camera is opened again",
+        _BLIND + "; a take-off lands; the camera is opened again",
         _FAST,
     ),
     Hazard(
@@ -310,7 +310,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.FRAMES_STALE,
         "no picture at all: as stale ones",
         Action.HOLD,
-        _BLIND + "; the camera is opened again",
+        _BLIND + "; a take-off lands; the camera is opened again",
         _FAST,
     ),
     Hazard(

@@ -171,6 +171,20 @@ def test_a_vehicle_found_flying_is_not_steered_before_the_meaning_of_thrust_is_k
     virtual(test())
 
 
+def test_a_vehicle_found_flying_for_nobody_is_landed_by_a_mission_that_is_over() -> None:
+    """Our heartbeats keep it from landing by itself; nothing was asked of it, for it had never been held."""
+
+    async def test() -> None:
+        autopilot = ScriptedAutopilot()
+        autopilot.mode, autopilot.armed = GUIDED_NOGPS, True
+        async with scripted(autopilot) as (_, vehicle):
+            vehicle.demand(Demand.LAND)
+            await asyncio.sleep(2.0)
+            assert [command.param2 for command in autopilot.commands(SET_MODE)][:1] == [LAND]
+
+    virtual(test())
+
+
 def test_a_clock_that_leaps_back_in_the_air_does_not_change_what_thrust_means() -> None:
     async def test() -> None:
         async with ardupilot_rig(PeerConfig(ready_s=0.5, parameters={"GUID_OPTIONS": 8})) as rig:

@@ -73,6 +73,8 @@ class Faults:
     stall_ns: int = 0
     """No tick for so long; the setpoint before holds, what comes meanwhile waits."""
     silent: bool = False
+    untold: bool = False
+    """The adapter fails when it is asked for the vehicle's state."""
     heartless: bool = False
     rangeless: bool = False
     climbless: bool = False
@@ -323,6 +325,8 @@ class IdealFlight:
         return Attitude(self._now_ns, s.roll_rad, s.pitch_rad, wrap_pi(s.yaw_rad + self.faults.yaw_rad))
 
     def _state(self) -> VehicleState | None:
+        if self.faults.untold:
+            raise ValueError("what no adapter ever raises")
         if self.link is not None:
             return self.link.state(self._now_ns, in_control=lambda armed: armed and self.in_control)
         faults = self.faults

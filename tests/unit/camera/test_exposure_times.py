@@ -61,6 +61,20 @@ def test_what_waited_before_a_stream_was_opened_is_not_delivered() -> None:
     assert all(abs(stamp - at) < MS for at, stamp in known)
 
 
+def test_what_waited_before_a_stream_was_opened_again_is_not_delivered_either() -> None:
+    """Its device counts anew, and a second comes at once."""
+    first = [n * INTERVAL for n in range(60)]
+    gap = 60 * INTERVAL
+    again = [first[-1] + gap + n * INTERVAL for n in range(80)]
+    opened = again[30]
+    arrivals = [at + DELAY for at in first] + [max(at + DELAY, opened + n * MS) for n, at in enumerate(again)]
+    device = [at + EPOCH for at in first] + [at - again[0] for at in again]
+    _, stamps = times_of(arrivals, list(device))
+    delivered = [(at, stamp) for at, stamp in zip(again, stamps[60:], strict=True) if stamp is not None]
+    assert len(delivered) >= 25
+    assert all(abs(stamp - at) < MS for at, stamp in delivered)
+
+
 @pytest.mark.parametrize("told", [None, 0, 7])
 def test_without_the_drivers_time_frames_that_may_have_waited_are_refused(told: int | None) -> None:
     exposed = [n * INTERVAL for n in range(60)]

@@ -82,6 +82,27 @@ def test_air_grows_from_where_it_was_seen_last_and_over_all_that_it_was_released
     assert (air.closed, air.doubt_m) == (frozenset(), 0.0)
 
 
+def test_who_holds_beside_a_crossing_is_not_on_the_line_across() -> None:
+    b2 = FLOOR.lanes.vertices[B2]
+    lane = FLOOR.around((b2.x_m + 0.8, b2.y_m))
+    assert len(lane) == 1
+    assert [FLOOR.around((b2.x_m + 0.39, b2.y_m + off_m)) for off_m in (-0.12, 0.12)] == [lane, lane]
+
+
+def test_who_holds_and_knows_his_place_again_is_beside_his_air_no_more() -> None:
+    air = seen(told(Phase.HOLD, "B2"))
+    closed = air.closed
+    air.close([], 3.0, holds=False)
+    assert air.doubt_m == 3.0
+    air.see(told(Phase.HOLD, "B2"), stood=True, ordered=False)
+    air.close([], 0.0, holds=True)
+    assert (air.doubt_m, closed <= air.closed) == (0.0, True)
+    air.close([], 3.0)
+    air.see(told(Phase.HOLD, "B2", session="b 2"), stood=False, ordered=False)
+    air.close([], 0.0, holds=True)
+    assert air.doubt_m == 3.0, "it began in flight"
+
+
 def test_a_position_of_a_session_that_began_in_the_air_is_not_believed() -> None:
     air = seen(told(Phase.HOVER, "B3"), told(Phase.RECOVER, "B1", session="b 2"))
     assert (air.place, air.is_believed, B3 in air.closed) == (B3, False, True)

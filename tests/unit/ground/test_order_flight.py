@@ -23,6 +23,7 @@ from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
 from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
+from flightd.ground.mqtt.sent_commands import SentCommands
 from flightd.ground.mqtt.shelf_counts import counted_in_words
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
@@ -78,6 +79,46 @@ def test_a_drone_in_the_air_is_sent_on_before_it_turns_home(
     possible = () if phase is Phase.LAND else IN_AIR
     told = status(phase, way, possible=possible)
     assert next_act(told, Wish(nodes(ahead), last), ("p", ())) == asked
+
+
+WAITS = [
+    # phase, way, where it waits, ahead, last, what is asked
+    (Phase.FOLLOW, "A4 A4 A1", "A4", "A4", "A3", None),
+    (Phase.HOVER, "A4 A4 A1", "A4", "", "A4", None),
+    (Phase.HOVER, "A4 A3 A1", "A4", "", "A4", None),  # the way home is not what comes next
+    (Phase.HOLD, "A4 A3 A1", "A4", "", "A4", None),
+    (Phase.HOLD, "A4 A3 A1", "A4", "A3", "A4", CommandNext(GOTO, "A3", waits=True)),
+    (Phase.FOLLOW, "A4 A4 A1", "A4", "A4 A5", "A3", CommandNext(GOTO, "A5", waits=True)),
+    (Phase.HOLD, "A5 A5 A1", "A5", "A5", "A4", CommandNext(RESUME)),  # it was paused besides
+    (Phase.FOLLOW, "A3 A4 A5 A5 A1", "A5", "A3", "A2", CommandNext(GOTO, "A3", waits=True)),  # cancelled
+    (Phase.HOVER, "A4 A3 A1", "", "", "A4", CommandNext(GOTO, "A4", waits=True)),  # it would fly home
+    (Phase.FOLLOW, "A3 A4 A4 A1", "A4", "", "A2", CommandNext(PAUSE)),  # paused on its way
+]
+
+
+@pytest.mark.parametrize(("phase", "way", "waits_at", "ahead", "last", "asked"), WAITS)
+def test_a_drone_that_waits_at_the_end_of_its_way_is_sent_on_from_there_however_late(
+    phase: Phase, way: str, waits_at: str, ahead: str, last: str, asked: Next
+) -> None:
+    told = status(phase, way, waits_at=waits_at)
+    assert next_act(told, Wish(nodes(ahead), last), ("p", ())) == asked
+
+
+def test_a_drone_that_waits_counts_once_more_where_it_is_and_lands_where_it_may() -> None:
+    counting = Wish((), "A4", works=True)
+    again = CommandNext(GOTO, "A4", waits=True)
+    assert next_act(status(Phase.HOLD, "A4 A3 A1", waits_at="A4"), counting, None) == again
+    assert next_act(status(Phase.HOLD, "A4 A4 A1", waits_at="A4"), counting, None) == CommandNext(RESUME)
+    assert next_act(status(Phase.SCAN, "A4 A4 A1", waits_at="A4"), counting, None) is None
+    lands = Wish((), "A1", lands=True)
+    assert next_act(status(Phase.HOLD, "A1 A1", waits_at="A1"), lands, None) == CommandNext(GOTO, "A1")
+    assert next_act(status(Phase.FOLLOW, "A1", waits_at=""), lands, None) is None
+
+
+def test_a_node_that_was_visited_between_two_reports_was_reached() -> None:
+    wish = Wish(("A2", "A3"), "A1")
+    assert reached(status(Phase.FOLLOW, "A2 A2 A1", waits_at="A2"), wish) is None
+    assert reached(status(Phase.HOLD, "A2 A1", waits_at="A2"), wish) == "A2"
 
 
 def test_a_count_is_not_paused_and_a_drone_on_its_way_home_is_not_sent_on() -> None:
@@ -191,19 +232,59 @@ def test_a_command_that_is_not_the_managers_takes_the_drone_from_him() -> None:
     assert taken == [True, False]
 
 
+def test_a_command_is_the_managers_once_and_as_long_as_it_can_take_effect() -> None:
+    def pause(at_s: float) -> EventReport:
+        return EventReport(1, "s", 1, round(at_s * 1e9), EventLevel.INFO, "command", "pause")
+
+    sent = SentCommands()
+    sent.note("pause", 0)
+    assert [sent.take(pause(at_s)) for at_s in (9.0, 9.5)] == [True, False]
+    sent.note("pause", 0)
+    assert not sent.take(pause(11.0)), "it never arrived"
+    sent.note("pause", 20_000_000_000)
+    sent.refused("pause")
+    assert not sent.take(pause(21.0))
+
+
 class Link:
     """A drone's link that takes everything, and notes it."""
 
     def __init__(self) -> None:
         self.asked: list[str] = []
 
-    async def plan_flight(self, asked: tuple[str, ...], *_: Any, dry: bool = False, **__: Any) -> Any:
-        self.asked += [] if dry else [f"plan {' '.join(asked)}"]
+    async def plan_flight(
+        self, asked: tuple[str, ...], *_: Any, dry: bool = False, waits: bool = False, **__: Any
+    ) -> Any:
+        self.asked += [] if dry else [f"plan {' '.join(asked)}{', to wait there' * waits}"]
         told = {"batteries": 1, "way": ("A1", "A2"), "places": 0, "sweeps": (), "seconds": 9.0, "way_m": 9.0}
         return type("Planned", (), told)
 
     async def act(self, act: Any, **_: Any) -> None:
         self.asked.append(act.command.value)
+
+
+@pytest.mark.parametrize(("waits_at", "asked"), [("", "plan A2, to wait there"), (None, "plan A2")])
+def test_a_daemon_that_does_not_tell_how_its_way_ends_is_not_asked_to_wait(
+    waits_at: str | None, asked: str
+) -> None:
+    drone = ManagedDrone("demo", Version.V3_0, Measures(3, 1, 1, 1, 1, 1), OrderRules(60, lambda *_: None))
+    link = Link()
+
+    async def go() -> None:
+        running = asyncio.create_task(drone.run(link))  # type: ignore[arg-type]
+        told = status(Phase.PREFLIGHT, plan="", waits_at=waits_at)
+        welcome = {"session": "one", "role": "operator", "floor": floor_status(SITE)}
+        heard = LinkState(True, 0.0, 1.0, 0, False, False, "")
+        for topic, value in (("link", heard), ("welcome", welcome), ("status", told)):
+            drone.tell(topic, value)
+        await asyncio.sleep(3.0)
+        drone.hear(order("A1 A2"))
+        await asyncio.sleep(5.0)
+        assert link.asked[0] == asked
+        running.cancel()
+        await asyncio.wait([running])
+
+    virtual(go())
 
 
 @pytest.mark.parametrize("anew", [True, False])

@@ -5,27 +5,32 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import pytest
 
 from flightd.adapters.ground_link.floor_status import floor_status
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.cells import CellSize
 from flightd.fleet.traffic.dispatcher import Dispatcher
 from flightd.fleet.traffic.traffic_control import TrafficControl
+from flightd.fleet.vda5050.parts import Action
+from flightd.fleet.vda5050.state import ActionStatus
 from flightd.fleet.vehicle.drone_factsheet import Measures
+from flightd.fleet.vehicle.signals import Progress
 from flightd.ground.fleet.fleet_floor import FleetFloor
 from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.hub import Hub
 from flightd.ground.messages import Act
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
+from flightd.ground.mqtt.shelf_counts import ShelfCounts
 from flightd.sim.fleet.judge import FleetJudge
 from flightd.site.site import Site
 from tests.rigs.event_loops import virtual
 from tests.rigs.paper_drones import STEP_S, PaperDrone, hall
 
+T = TypeVar("T")
 BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
 
 
@@ -43,10 +48,21 @@ class PaperFleet:
 
     def __init__(self, sites: Mapping[str, Site], hold_s: float = 20.0) -> None:
         self.written: list[tuple[str, str, str, str]] = []
-        self.own = OwnFleet(sites, BODY, OrderRules(hold_s, lambda *line: self.written.append(line)))
+        self.own = OwnFleet(
+            sites, BODY, OrderRules(hold_s, lambda *line: self.written.append(line)), self.aside
+        )
+        self.deciding: asyncio.Event | None = None
+        """What is decided comes no sooner."""
         self.pages: dict[tuple[str, str], Any] = {}
         self.drones = {name: PaperDrone(name, site, self.own.tell) for name, site in sites.items()}
         self.judge = FleetJudge(CellSize(upright_m=100.0), 0.0)
+
+    async def aside(self, work: Callable[[], T]) -> T:
+        """At once, and what comes of it when a test wants it."""
+        found = work()
+        if self.deciding is not None:
+            await self.deciding.wait()
+        return found
 
     def tell(self, drone: str, topic: str, value: Any) -> None:
         """As the hub tells its pages."""
@@ -144,6 +160,22 @@ def test_a_named_drone_visits_what_it_is_asked_for_round_the_one_that_a_person_t
     fly(go)
 
 
+def test_who_lost_his_place_for_a_moment_while_he_holds_keeps_others_no_longer() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        await on_way_to("B3", fleet)
+        await b.act(Act("by-ann-1", CommandKind.PAUSE))
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: a.phase is Phase.FOLLOW and a.way[0] == "A3", 100)
+        b.sees = False
+        await until(lambda: a.phase is Phase.HOLD, 20)
+        b.sees = True
+        await until(lambda: a.phase is Phase.DONE, 200)
+        assert (b.phase, fleet.state["done"]) == (Phase.HOLD, ["A3"])
+
+    fly(go, "ab")
+
+
 def test_a_drone_that_holds_over_a_node_is_flown_on_when_it_is_given_back() -> None:
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
@@ -166,7 +198,11 @@ def test_who_is_silent_has_his_way_home_to_himself_until_he_is_heard() -> None:
         b.heard = False
         fleet.own.ask(["B2"], "c")
         await until(lambda: not fleet.flown("b"))
-        await until(lambda: b.phase is Phase.DONE, 200)  # nobody pauses it at the end of its base
+        await until(lambda: b.phase is Phase.HOLD, 60)
+        await asyncio.sleep(20.0)
+        assert (b.phase, b.way[0]) == (Phase.HOLD, "B3"), "nobody paused it at the end of its base"
+        b.turn_home()
+        await until(lambda: b.phase is Phase.DONE, 200)
         assert fleet.state["done"] == [], "nobody was sent into its way"
         b.heard = True
         await until(lambda: fleet.pages["b", "manager"] == {"flies": False})
@@ -250,6 +286,24 @@ def test_a_pause_between_two_nodes_leaves_a_drone_to_traffic(monkeypatch: pytest
     fly(go, "b")
 
 
+def test_a_pause_that_never_arrived_hides_no_later_one_of_a_person(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        await on_way_to("B3", fleet)
+        b.refuses[CommandKind.PAUSE] = UnavailableError("no answer")
+        with monkeypatch.context() as patched:
+            patched.setattr(TrafficControl, "paused", lambda _: frozenset({"b"}))
+            await asyncio.sleep(1.0)
+        b.refuses.clear()
+        assert "pause" not in b.commands
+        await asyncio.sleep(12.0)
+        assert fleet.flown("b")
+        b.ordered_elsewhere("pause")
+        await until(lambda: not fleet.flown("b"), 5)
+
+    fly(go, "b", counts=True)
+
+
 def test_who_was_paused_as_traffic_failed_is_flown_on_by_the_new_one(monkeypatch: pytest.MonkeyPatch) -> None:
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
@@ -287,6 +341,17 @@ def test_no_drone_is_sent_home_through_the_air_of_another_one() -> None:
         assert b.commands[-1] == "home"
 
     fly(go, "ab")
+
+
+def test_who_makes_for_home_by_himself_is_flown_by_somebody_else() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B4"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B3", 100)
+        b.way, b.waits = ["B1", "B1"], False  # whatever its reason, and though it could be sent on
+        await until(lambda: not fleet.flown("b"), 5)
+
+    fly(go, "b")
 
 
 def test_the_end_halts_who_flies_while_traffic_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -333,6 +398,28 @@ def test_an_error_about_one_drone_ends_no_other_one(monkeypatch: pytest.MonkeyPa
     fly(go, "ab")
 
 
+def test_what_was_decided_while_a_person_took_a_drone_is_not_flown_by_it() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.deciding = asyncio.Event()
+        await asyncio.sleep(1.0)
+        fleet.own.ask(["B3"], "b")
+        assert fleet.state["open"] == ["B3"], "it was asked for while something is decided"
+        fleet.deciding.set()
+        fleet.deciding = asyncio.Event()
+        await until(lambda: fleet.state["given"] == {"B3": "b"})
+        fleet.own.hand_over("b", to_manager=False)
+        await asyncio.sleep(5.0)
+        assert (b.commands, fleet.flown("b")) == ([], True), "it is as it was before"
+        fleet.deciding.set()
+        fleet.deciding = None
+        fleet.own.ask(["A2"], "a")
+        await until(lambda: fleet.state["done"] == ["A2"], 200)
+        assert (b.commands, fleet.flown("b"), fleet.state["open"]) == ([], False, ["B3"])
+
+    fly(go, "ab")
+
+
 def test_what_another_station_commands_takes_a_drone_and_the_end_halts_the_others() -> None:
     async def go(fleet: PaperFleet) -> None:
         a, b = fleet.drones["a"], fleet.drones["b"]
@@ -358,9 +445,26 @@ def test_where_traffic_fails_everybody_ends_his_base_and_is_brought_home_anew(
             await until(lambda: not fleet.state["flies"])
             assert fleet.state["trouble"] == "it failed: division by zero"
             await until(lambda: a.phase is Phase.HOLD and b.phase is Phase.HOLD)
+            assert (fleet.state["given"], fleet.state["done"]) == ({"A3": "a", "B3": "b"}, [])
         await until(lambda: a.phase is Phase.DONE and b.phase is Phase.DONE, 300)
+        assert set(fleet.state["open"]) == {"A3", "B3"}, "the work is kept"
+        await asyncio.sleep(1.0)
+        a.begin_anew()
+        await until(lambda: set(fleet.state["done"]) == {"A3", "B3"}, 300)
 
     fly(go, "ab")
+
+
+def test_work_over_which_traffic_fails_again_and_again_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        fleet.own.ask(["A3"])
+        monkeypatch.setattr(Dispatcher, "_give_tour", lambda *_: 1 / 0)
+        await until(lambda: fleet.state["not_done"] == {"A3": "traffic failed over it"}, 20)
+        await until(lambda: fleet.state["flies"], 20)
+        await asyncio.sleep(10.0)
+        assert fleet.state["flies"]
+
+    fly(go, "a")
 
 
 def test_a_drone_that_counts_is_not_sent_on_before_its_count_is_over() -> None:
@@ -373,6 +477,60 @@ def test_a_drone_that_counts_is_not_sent_on_before_its_count_is_over() -> None:
         await until(lambda: fleet.state["done"] == ["A2"], 10)
         await until(lambda: a.phase is Phase.DONE, 300)
         assert fleet.state["done"] == ["A2", "A3"]
+
+    fly(go, "a", counts=True)
+
+
+def test_what_a_drone_does_not_fly_to_because_it_would_not_come_home_is_told_and_it_comes_home() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == "B2", 100)
+        b.left_s = 9.0
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert fleet.state["not_done"] == {"B3": "b: the drone would not come home from B3; it holds before"}
+        assert "home" not in b.commands
+
+    fly(go, "b")
+
+
+def test_what_one_drone_refuses_is_done_by_another_one() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"])
+        await until(lambda: fleet.state["given"] == {"B3": "b"} and b.phase is Phase.TAKE_OFF, 100)
+        b.refuses[CommandKind.GOTO] = RunError("goto refused: a shelf has fallen over")
+        fleet.own.ask(["B2"], "b")
+        await until(lambda: not fleet.flown("b"), 60)
+        b.refuses.clear()
+        await until(lambda: b.phase is Phase.DONE and fleet.state["done"] == ["B3"], 300)
+
+    fly(go, "bc")
+
+
+def test_what_a_drone_refuses_that_alone_may_do_it_has_its_reason() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.TAKE_OFF, 100)
+        b.refuses[CommandKind.GOTO] = RunError("refused: a shelf has fallen over")
+        await until(lambda: not fleet.flown("b"), 60)
+        b.refuses.clear()
+        await until(lambda: b.phase is Phase.DONE, 200)
+        assert (fleet.state["open"], fleet.state["not_done"]) == ([], {"B3": "b: a shelf has fallen over"})
+
+    fly(go, "b")
+
+
+def test_a_count_that_fails_is_not_done_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(_: ShelfCounts, action: Action, *__: Any) -> Progress:
+        return Progress(action.action_id, ActionStatus.FAILED, "no front camera")
+
+    async def go(fleet: PaperFleet) -> None:
+        monkeypatch.setattr(ShelfCounts, "begin", fails)
+        fleet.own.ask(["A2"])
+        await until(lambda: fleet.drones["a"].phase is Phase.DONE, 200)
+        assert (fleet.state["done"], fleet.state["not_done"]) == ([], {"A2": "a: no front camera"})
 
     fly(go, "a", counts=True)
 
@@ -397,6 +555,44 @@ def test_a_drone_with_little_left_is_sent_nowhere() -> None:
         assert (fleet.state["open"], fleet.drones["a"].commands) == (["A2"], [])
 
     fly(go, "a")
+
+
+def test_who_has_another_pad_after_a_start_is_flown_once_all_rest_and_round_it_until_then() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, c = fleet.drones["a"], fleet.drones["c"]
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: a.phase is Phase.FOLLOW, 100)
+        c.site = hall("c", pad="A5")
+        c.begin_anew()
+        await until(lambda: not fleet.flown("c"))
+        assert fleet.state["drones"]["c"]["why"] == "it has another pad than before: at A5"
+        fleet.own.ask(["A4"], "a")
+        fleet.own.ask(["B4"], "c")
+        await until(lambda: a.phase is Phase.DONE, 200)
+        assert fleet.state["done"] == ["A3"], "it stands beside A4"
+        await asyncio.sleep(1.0)
+        a.begin_anew()
+        await until(lambda: fleet.flown("c"), 20)
+        await until(lambda: "B4" in fleet.state["done"] and c.phase is Phase.DONE, 300)
+        assert c.truth.x_m == c.site.nodes["A5"].x_m
+
+    fly(go, "ac")
+
+
+def test_who_flies_by_another_map_after_a_start_is_not_flown_and_the_others_are() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        c = fleet.drones["c"]
+        c.site = hall("c", "shed")
+        c.begin_anew()
+        await until(lambda: fleet.state["drones"]["c"]["why"] == "it flies by another map: shed")
+        await until(lambda: fleet.state["trouble"] != "")
+        fleet.own.ask(["A3"])
+        await until(lambda: fleet.state["done"] == ["A3"], 200)
+        c.site = hall("c")
+        c.begin_anew()
+        await until(lambda: fleet.flown("c"))
+
+    fly(go, "ac")
 
 
 def test_nodes_and_drones_that_are_not_there_are_refused() -> None:

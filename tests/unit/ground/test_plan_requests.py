@@ -7,7 +7,7 @@ import pytest
 
 from flightd.adapters.ground_link.messages.answers import Accepted, Code, PlanAnswer, Planned, Refused
 from flightd.adapters.ground_link.messages.base import VERSION
-from flightd.adapters.ground_link.messages.requests import PlanFlight
+from flightd.adapters.ground_link.messages.requests import Order, PlanFlight
 from flightd.adapters.ground_link.protocol import MAX_REQUEST_BYTES, decode_answer, encode
 from flightd.core.planned_flight import MOST_NODES
 from flightd.core.types import CommandKind, Phase
@@ -128,3 +128,28 @@ def test_the_largest_plan_of_usual_names_fits_into_a_request() -> None:
         version=VERSION, id="x" * 32, nodes=tuple(f"AISLE-12.{i}" for i in range(MOST_NODES))
     )
     assert len(msgspec.json.encode(request)) < MAX_REQUEST_BYTES
+
+
+def test_a_plan_over_nodes_and_a_goto_may_end_by_waiting_and_nothing_else() -> None:
+    rig = waiting()
+    assert isinstance(rig.plan("A2", waits=True), Planned)
+    flies = RequestHandlerRig()
+    assert isinstance(flies.order("goto", node="A3", waits=True), Accepted)
+    commands = (*rig.handler.take_commands(), *flies.handler.take_commands())
+    assert [(command.kind, command.waits) for command in commands] == [
+        (CommandKind.PLAN, True),
+        (CommandKind.GOTO, True),
+    ]
+    refused(flies.order("pause", waits=True), Code.MALFORMED)
+    refused(rig.plan(waits=True), Code.MALFORMED)
+
+
+def test_what_a_client_leaves_out_a_daemon_of_before_need_not_know() -> None:
+    order = Order(version=1, id="order-0001", command=CommandKind.GOTO, node="A2")
+    assert msgspec.json.decode(msgspec.json.encode(order)).keys() == {
+        "op",
+        "version",
+        "id",
+        "command",
+        "node",
+    }

@@ -114,5 +114,7 @@ class Flight:
         self.run(within_s, lambda: self.phase is phase)
         assert self.phase is phase, self.mission.reason
 
-    def order(self, kind: CommandKind, node: str = "", nodes: tuple[str, ...] = ()) -> None:
-        self.mission.command(Command("1", kind, node, nodes), self.now_ns)
+    def order(
+        self, kind: CommandKind, node: str = "", nodes: tuple[str, ...] = (), *, waits: bool = False
+    ) -> None:
+        self.mission.command(Command("1", kind, node, nodes, waits=waits), self.now_ns)

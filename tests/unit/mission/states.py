@@ -199,6 +199,12 @@ def warned(within_s: float = 0.4, **changes: Any) -> Stimulus:
     return Stimulus(lambda flight: flight.set(warnings=replace(ALL_WELL, **changes)), within_s)
 
 
+def frozen_off_the_floor(flight: Flight) -> None:
+    """Near the pad a picture may stay the same."""
+    height_m = max(flight.inputs.height_m, 0.6)
+    flight.set(height_m=height_m, warnings=replace(ALL_WELL, frozen_s=9.0))
+
+
 def sick(params: Config = PARAMS, **changes: Any) -> Stimulus:
     health = replace(ALL_WELL.health, **changes)
     return Stimulus(lambda flight: flight.set(warnings=replace(ALL_WELL, health=health)), params=params)
@@ -312,7 +318,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.TELEMETRY_STALE: sensed(telemetry_age_s=0.2),
     Trigger.CLOCK_JUMP: sensed(dt_s=0.6),
     Trigger.CLOCK_UNSURE: sensed(clock_error_s=0.5),
-    Trigger.CAMERA_FROZEN: warned(frozen_s=9.0),
+    Trigger.CAMERA_FROZEN: Stimulus(frozen_off_the_floor),
     Trigger.CAMERA_BLIND: warned(blank_s=9.0),
     Trigger.FRAMES_STALE: warned(frame_age_s=9.0),
     Trigger.HEIGHT_WRONG: warned(height_doubted=True),
@@ -334,6 +340,9 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.SCAN_DUE: Stimulus(_idle, scanning=(Phase.HOVER,)),
     Trigger.AT_VIEW: Stimulus(_idle, 10.0, follow=True),
     Trigger.VIEW_DONE: Stimulus(_idle, 0.6),
+    Trigger.AWAITS_MORE: Stimulus(
+        lambda flight: flight.order(CommandKind.GOTO, "A3", waits=True), 0.04, hold=False
+    ),
     Trigger.DWELLED: placed(1.2),
     Trigger.TURNED: placed(),
     Trigger.ROUTE_DONE: placed(1.2),

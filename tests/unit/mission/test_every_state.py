@@ -32,6 +32,8 @@ SHADOWED = {
     # there is another stop, another view; the states of a landing were reached through these
     *((State(Phase.HOVER, intent), Trigger.ROUTE_DONE) for intent in (Intent.VISIT, *_BACK)),
     (State(Phase.SCAN, Intent.VISIT), Trigger.DWELLED),
+    # the end of a way is another stop
+    (State(Phase.HOVER, Intent.VISIT), Trigger.AWAITS_MORE),
     # a start is taken only of a vehicle that was seen to stand
     (State(Phase.PREFLIGHT, Intent.VISIT), Trigger.FOUND_FLYING),
 }

@@ -250,8 +250,24 @@ def test_a_take_off_whose_pictures_stop_lands() -> None:
     flight.set(warnings=replace(ALL_WELL, frame_age_s=0.6))
     flight.run(0.1)
     assert flight.phase.value == "take_off"
-    flight.set(warnings=replace(ALL_WELL, frame_age_s=1.0))
+    flight.set(warnings=replace(ALL_WELL, frame_age_s=1.1))
     flight.to(Phase.LAND, within_s=0.1)
+
+
+@pytest.mark.parametrize(
+    ("height_m", "frozen_s", "blank_s", "lands"),
+    [(0.6, 1.1, 0.0, True), (0.6, 0.9, 0.0, False), (0.3, 9.0, 0.0, False), (0.6, 9.0, 9.0, False)],
+)
+def test_a_take_off_whose_picture_repeats_itself_lands(
+    height_m: float, frozen_s: float, blank_s: float, lands: bool
+) -> None:
+    """It climbed on without steering.  Near the pad, or black, a picture is allowed to be the same."""
+    flight = Flight()
+    flight.to(Phase.TAKE_OFF)
+    flight.run(3.0, lambda: flight.inputs.height_m > height_m)
+    flight.set(warnings=replace(ALL_WELL, frozen_s=frozen_s, blank_s=blank_s))
+    flight.run(0.1)
+    assert flight.phase is (Phase.LAND if lands else Phase.TAKE_OFF)
 
 
 def test_a_long_leg_is_given_its_time() -> None:

@@ -52,7 +52,7 @@ class Ticked:
         self.kept: list[tuple[str, object]] = []
         self.setpoints = HeldSetpoint()
         self.pilot = pilot_of(CONFIG, SITE, FlightOrder(("A2",)))
-        vehicle = IdealVehicle(lambda: self.vehicle, self.demands.append)
+        vehicle = IdealVehicle(self._told("vehicle", lambda: self.vehicle), self.demands.append)
         ground = IdealGround(lambda: self.commands, self._told("ground", lambda: self.silent_s))
         recorder = IdealRecorder(
             self._told("recorder", lambda: HEALTHY),
@@ -115,6 +115,19 @@ def test_a_ground_link_that_never_answers_is_silent_from_the_start() -> None:
     flight.broken = {"ground"}
     flight.run(1.0)
     assert flight.run(6.0).ground_silent_s > 4.9
+
+
+def test_a_vehicle_that_fails_to_tell_is_as_it_told_last() -> None:
+    """It was taken for one that is not there, and so not armed."""
+    flight = Ticked()
+    flight.broken = {"vehicle"}
+    assert flight.run(1.0).vehicle is None
+    flight.broken = set()
+    assert flight.run(2.0).vehicle == VEHICLE
+    flight.broken = {"vehicle"}
+    assert flight.run(9.0).vehicle == VEHICLE
+    flight.broken, flight.vehicle = set(), None
+    assert flight.run(10.0).vehicle is None
 
 
 def test_a_part_that_cannot_tell_how_it_does_is_not_healthy() -> None:

@@ -127,6 +127,13 @@ class StatusReport(msgspec.Struct, frozen=True):
     plan: Annotated[
         str, Meta(description="id of the order that the plan came with; empty: the configuration's plan")
     ] = ""
+    waits_at: Annotated[
+        str | None,
+        Meta(
+            description="node ahead at which its way ends: it holds there until another order; empty: it "
+            "flies home; null: a daemon that always does"
+        ),
+    ] = None
 
 
 class EventReport(msgspec.Struct, frozen=True):

@@ -20,7 +20,7 @@ class Hello(ClientRequest, frozen=True, tag="hello"):
     client: Annotated[str, Meta(max_length=64, description="name of the client program, for the log")] = ""
 
 
-class Order(ClientRequest, frozen=True, tag="command"):
+class Order(ClientRequest, frozen=True, tag="command", omit_defaults=True):
     """A command to the mission; operators only.  Answer: `accepted`, or `refused`."""
 
     command: Annotated[
@@ -46,6 +46,9 @@ class Order(ClientRequest, frozen=True, tag="command"):
             "stop, land and pause are taken: the order may have lain in a queue",
         ),
     ] = 0
+    waits: Annotated[
+        bool, Meta(description="only with goto: hold there until another order, rather than fly home")
+    ] = False
 
 
 class PlanFlight(ClientRequest, frozen=True, tag="plan_flight", omit_defaults=True):
@@ -65,6 +68,9 @@ class PlanFlight(ClientRequest, frozen=True, tag="plan_flight", omit_defaults=Tr
         bool, Meta(description="in the quickest order (many nodes: aisle by aisle), not as listed")
     ] = False
     dry: Annotated[bool, Meta(description="only say what it would be; by viewers, too")] = False
+    waits: Annotated[
+        bool, Meta(description="hold at the last node until another order, rather than fly home")
+    ] = False
     session: Annotated[
         str, Meta(max_length=64, description="from `welcome`; given, a daemon started since then refuses")
     ] = ""

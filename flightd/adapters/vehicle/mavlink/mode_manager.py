@@ -278,7 +278,7 @@ class ModeArmingManager:
         firmware, held, armed = self._firmware, self._authority.held, self._telemetry.armed
         problem = self._problem(demand)
         match demand:
-            case Demand.KEEP if held is None and armed and self._flies_for_nobody(problem):
+            case Demand.KEEP | Demand.LAND if held is None and armed and self._flies_for_nobody(problem):
                 self._refused, self._unread = problem, problem is not None
                 self._authority.ask(firmware.flying_mode, firmware.flying_mode)
             case Demand.FLY | Demand.KEEP if problem is not None:

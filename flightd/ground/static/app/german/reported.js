@@ -174,6 +174,7 @@ export default {
   "pause ordered": "Pause befohlen",
   "position doubted": "Position bezweifelt",
   "lines found": "Linien gefunden",
+  "waiting to be told where to fly on": "wartet darauf, wohin sie weiterfliegen soll",
   "position sure again": "Position wieder sicher",
   "found flying": "fliegend vorgefunden",
   "nobody took over after the restart": "niemand hat nach dem Neustart übernommen",
