@@ -8,6 +8,7 @@ from collections.abc import Callable
 from flightd.app.flight import Tasks
 from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
+from flightd.core.refusal import Refusal
 from flightd.core.scanning import CodeSet
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickOutput
@@ -77,6 +78,15 @@ class NoInterlock:
         await _idle()
 
 
+class NoFitness:
+    """`app.flight.Fitness` of a computer that nobody looks at: a simulation's."""
+
+    unfit: Refusal | None = None
+
+    async def run(self, waits: Callable[[], bool]) -> None:  # noqa: ARG002 - the protocol names it
+        await _idle()
+
+
 class NoCamera:
     """`ports.Camera` that is not fitted."""
 
@@ -123,6 +133,7 @@ def keep_pose(pose: GridPose) -> None:
 NO_RECORDER = NoRecorder()
 NO_GROUND = NoGround()
 NO_INTERLOCK = NoInterlock()
+NO_FITNESS = NoFitness()
 NO_CAMERA = NoCamera()
 NO_COUNTING = NoCounting()
 NOTHING_KEPT = NothingKept()

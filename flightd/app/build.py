@@ -22,6 +22,7 @@ from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.app.absent_parts import (
     NO_CAMERA,
     NO_COUNTING,
+    NO_FITNESS,
     NO_GROUND,
     NO_INTERLOCK,
     NO_RECORDER,
@@ -33,7 +34,7 @@ from flightd.app.counting.flight_count import counts_shelves
 from flightd.app.detection.detector_pool import DetectorPool, Detectors
 from flightd.app.detection.latency import LatencyBook
 from flightd.app.detection.pipeline import DetectionPipeline
-from flightd.app.flight import Count, Flight, SetpointSink, Vision
+from flightd.app.flight import Count, Fitness, Flight, SetpointSink, Vision
 from flightd.app.flight_orders import configured_order
 from flightd.app.frame_tap import NO_FRAMES, FrameTap
 from flightd.app.publishers import TelemetryPublishers
@@ -46,7 +47,6 @@ from flightd.core.errors import FlightdError, InputError
 from flightd.core.flight_order import FlightOrder
 from flightd.core.learnt import LearntSensors
 from flightd.core.preview import CameraName
-from flightd.core.refusal import Refusal
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TICK_S
 from flightd.core.topics import Topic
@@ -104,7 +104,7 @@ def build(
     hold: Hold = nullcontext,
     startup_fault: FlightdError | None = None,
     interlock: Interlock | None = None,
-    unfit: Refusal | None = None,
+    fitness: Fitness = NO_FITNESS,
 ) -> Flight:
     """Connect the vehicle and the cameras and compose the flight that `order` asks for.  `peers` are those of
     the configuration unless given; `opener` opens sockets and time is held by `hold` while threads work, as
@@ -151,7 +151,7 @@ def build(
         keep_files=keep_files,
         startup_fault=startup_fault,
         interlock=interlock,
-        unfit=unfit,
+        fitness=fitness,
         down_frames=down_frames,
     )
 
@@ -173,13 +173,13 @@ def assemble(
     keep_files: bool = False,
     startup_fault: FlightdError | None = None,
     interlock: Interlock | None = None,
-    unfit: Refusal | None = None,
+    fitness: Fitness = NO_FITNESS,
     down_frames: FrameTap = NO_FRAMES,
 ) -> Flight:
     """Put a flight together from what is connected already.  `cameras` are the down and the front one;
     `keep_files`: the stops left over are kept in `mission.progress`, what is learnt of the sensors in
-    `tracking.learnt`, if those name files; `interlock` is the configured one unless given, `unfit` what
-    speaks against a flight on this computer, `down_frames` what the down camera's frames pass."""
+    `tracking.learnt`, if those name files; `interlock` is the configured one unless given, `fitness`
+    what speaks against a flight on this computer, `down_frames` what the down camera's frames pass."""
     progress, learnt = (config.mission.progress, config.tracking.learnt) if keep_files else (None, None)
     camera, front_camera = cameras
     return Flight(
@@ -199,7 +199,7 @@ def assemble(
         share_pose=_pose_sharing(config, site, vehicle),
         startup_fault=startup_fault,
         interlock=interlock or interlock_of(config, site, clock),
-        unfit=unfit,
+        fitness=fitness,
         down_frames=down_frames,
     )
 

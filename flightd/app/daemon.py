@@ -18,7 +18,7 @@ from flightd.app.tick import Tick
 from flightd.app.tick_pace import TickPace
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
 from flightd.core.tick import TICK_S
-from flightd.core.types import OVER, Command, Phase
+from flightd.core.types import OVER, WAITING, Command, Phase
 from flightd.ports import Camera
 from flightd.runtime.supervisor import restarted
 
@@ -84,6 +84,7 @@ class Daemon:
             "recorder": self._kept(flight.recorder.run),
             "ground": self._kept(flight.ground.run),
             "interlock": self._kept(flight.interlock.run),
+            "fitness": self._kept(partial(flight.fitness.run, self._waits)),
             "progress": self._kept(flight.progress.run),
             "learnt sensors": self._kept(flight.learnt.run),
             "front-camera": self._kept(partial(self._look, flight.front_camera)),
@@ -92,6 +93,9 @@ class Daemon:
         if flight.startup_fault is not None:
             parts["startup fault"] = self._only_look_after(flight.startup_fault)
         return parts
+
+    def _waits(self) -> bool:
+        return self._tick.output.phase in WAITING
 
     def _kept(self, part: Callable[[], Awaitable[None]]) -> Coroutine[Any, Any, None]:
         return restarted(part, self.failed)

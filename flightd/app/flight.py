@@ -114,6 +114,19 @@ class Count(Protocol):
         ...
 
 
+class Fitness(Protocol):
+    """Whether this computer is fit for a flight."""
+
+    @property
+    def unfit(self) -> Refusal | None:
+        """What was found against one, as it was looked at last."""
+        ...
+
+    async def run(self, waits: Callable[[], bool]) -> None:
+        """Keep that up to date while the drone `waits` on the ground, until cancelled."""
+        ...
+
+
 class Kept(Protocol[T_contra]):
     """Keeps what is told last beyond the end of the daemon."""
 
@@ -128,8 +141,7 @@ class Flight:
 
     `share_pose` gives the vehicle's own estimator the pose, where it can use it.  `startup_fault` is what
     the daemon should not fly with: on the ground it ends with that; a vehicle that it finds flying is looked
-    after all the same.  `unfit` is what the check of this computer found against a flight;
-    `down_frames` are the down camera's on their way to `vision`."""
+    after all the same.  `down_frames` are the down camera's on their way to `vision`."""
 
     clock: Clock
     pilot: Pilot
@@ -146,6 +158,6 @@ class Flight:
     publishers: TelemetryPublishers
     share_pose: Callable[[GridPose], None]
     interlock: Interlock
+    fitness: Fitness
     startup_fault: FlightdError | None = None
-    unfit: Refusal | None = None
     down_frames: FrameTap = NO_FRAMES

@@ -22,6 +22,7 @@ from flightd.adapters.store.settings_file import SettingsFile
 from flightd.app import service
 from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
 from flightd.app.build import build, detector_pool, ground_link
+from flightd.app.computer_check import ComputerCheck, look_here
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.flight_identity import FlightIdentity
@@ -34,15 +35,13 @@ from flightd.config.schema import Config
 from flightd.core.errors import InputError, TransientError
 from flightd.core.learnt import LearntSensors
 from flightd.core.snapshot import Snapshot
-from flightd.doctor.calibration import check_calibration
-from flightd.doctor.check import CheckLevel, FailedChecks
+from flightd.doctor.check import CheckLevel
 from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.ports import Recorder
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
 from flightd.runtime.ending_signals import end_on_signals
 from flightd.runtime.supervisor import restarted
-from flightd.site.site import Site
 from flightd.site.site_file import load_site
 
 _LOG = logging.getLogger(__name__)
@@ -155,7 +154,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
             keep_files=True,
             opener=open_paced_datagrams,
             startup_fault=count.error,
-            unfit=unfit_here(config, site),
+            fitness=ComputerCheck(partial(look_here, config, site)),
         )
         daemon, maintainer.flight = Daemon(flight), flight
         if run.taken_back:
@@ -190,19 +189,6 @@ async def _settled(file: SettingsFile) -> None:
     """Once the daemon has run for a while its settings are no trial any more."""
     await asyncio.sleep(_COME_UP_S)
     await asyncio.to_thread(file.confirm)
-
-
-def unfit_here(config: Config, site: Site) -> FailedChecks | None:
-    """What the doctor finds against a flight on this computer without moving or asking anything; what only
-    deserves a look is logged."""
-    camera, height_m = config.camera, config.mission.height_m
-    checks = [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
-    checks += check_calibration(camera, site, height_m)
-    for check in checks:
-        if check.level is CheckLevel.WARNING:
-            _LOG.warning("%s: %s; %s", check.name, check.text, check.remedy)
-    failed = tuple(check for check in checks if check.level is CheckLevel.ERROR)
-    return FailedChecks(failed) if failed else None
 
 
 def _failing(config: Config) -> set[str]:

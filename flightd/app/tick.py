@@ -65,7 +65,7 @@ class Tick:
                 call("detection", lambda: self._vision_health(now_ns), None),
                 call("recorder", self._recorder_health, None),
             ),
-            flight.unfit,
+            flight.fitness.unfit,
             call("interlock", lambda: flight.interlock.is_closed, False),
         )
 

@@ -6,20 +6,24 @@ import itertools
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NoReturn, TypeVar
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
-from flightd.app.simulation.launch import fly
-from flightd.app.simulation.scenario_sweep import Prepare, SweptFlight, fly_every_hazard
+from flightd.app.simulation.launch import FlightInterruptedError, fly
+from flightd.app.simulation.scenario_sweep import Prepare, as_it_should, fly_every_hazard
 from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.summary import Summary, write_results
+from flightd.app.simulation.sweep_log import SweepLog, SweptRow
 from flightd.cli.flight_progress import FlightProgress
 from flightd.core.errors import RunError
 from flightd.mission.safety.hazard_table import HAZARDS
+
+_T = TypeVar("_T")
 
 _HEADINGS = (
     "hazard", "seed", "found after", "action", "phases", "outcome", "clearance", "off leg", "too high",
@@ -34,45 +38,73 @@ def faults_in_words(faults: Iterable[Mapping[str, Any]]) -> str:
     )
 
 
-def sweep(prepare: Prepare, seeds: Sequence[int], *, as_json: bool) -> None:
-    """Fly every hazard with each seed and print how it went.  RunError when one does not end as the table
-    says."""
-    announced = _announced(len(HAZARDS) * len(seeds), shown=not as_json)
-    flights = list(fly_every_hazard(prepare, announced, seeds))
-    wrong = [_name(flight, seeds) for flight in flights if not flight.as_it_should]
+def sweep(prepare: Prepare, seeds: Sequence[int], log: SweepLog, world: str, *, as_json: bool) -> None:
+    """Fly every hazard with each seed and print how it went, also where a signal ends it: exit code 128 and
+    the signal's number.  RunError when one does not end as the table says."""
+    asked, rows = len(HAZARDS) * len(seeds), list[SweptRow]()
+    announced = _announced(len(log) + 1, asked, shown=not as_json)
+    interrupted = _until_interrupted(fly_every_hazard(prepare, announced, seeds, log, world), rows)
+    wrong = [_name(row, seeds) for row in rows if not as_it_should(row)]
     if as_json:
-        print(json.dumps({"flights": [flight.document() for flight in flights], "wrong": wrong}, indent=2))
+        print(json.dumps({"flights": rows, "wrong": wrong, "interrupted": _signal(interrupted)}, indent=2))
     else:
-        _print(flights)
+        _print(rows)
+    if interrupted is not None:
+        _leave(interrupted, f"{len(rows)} of {asked} flights; the same command goes on with the rest")
     if wrong:
-        raise RunError(f"{len(wrong)} of {len(flights)} did not go as the table says: {', '.join(wrong)}")
+        raise RunError(f"{len(wrong)} of {len(rows)} did not go as the table says: {', '.join(wrong)}")
 
 
 def fly_seeds(simulations: Iterable[Simulation], *, as_json: bool) -> None:
-    """Fly each and print how it went.  RunError where the judge calls one bad."""
+    """Fly each and print how it went, also where a signal ends it: exit code 128 and the signal's number.
+    RunError where the judge calls one bad."""
     summaries: list[Summary] = []
-    for simulation in simulations:
-        print(f"flightd: seed {simulation.seed}", file=sys.stderr, flush=True)
-        started = time.monotonic()
-        with FlightProgress(shown=not as_json) as progress:
-            result = fly(replace(simulation, observer=progress))
-        summaries.append(write_results(simulation, result, time.monotonic() - started))
+    interrupted = _until_interrupted(_each_flown(simulations, shown=not as_json), summaries)
     bad = [summary["seed"] for summary in summaries if summary["verdict"] != "good"]
     if as_json:
-        print(json.dumps({"flights": summaries, "bad": bad}, indent=2))
+        print(json.dumps({"flights": summaries, "bad": bad, "interrupted": _signal(interrupted)}, indent=2))
     else:
         _print_seeds(summaries)
+    if interrupted is not None:
+        _leave(interrupted, f"{len(summaries)} flight{'s' * (len(summaries) != 1)}")
     if bad:
         raise RunError(f"{len(bad)} of {len(summaries)} flights are bad: seeds {', '.join(map(str, bad))}")
 
 
-def _name(flight: SweptFlight, seeds: Sequence[int]) -> str:
-    hazard = flight.verdict.hazard
-    return hazard if len(seeds) == 1 else f"{hazard} with seed {flight.simulation.seed}"
+def _each_flown(simulations: Iterable[Simulation], *, shown: bool) -> Iterator[Summary]:
+    for simulation in simulations:
+        print(f"flightd: seed {simulation.seed}", file=sys.stderr, flush=True)
+        started = time.monotonic()
+        with FlightProgress(shown=shown) as progress:
+            result = fly(replace(simulation, observer=progress))
+        yield write_results(simulation, result, time.monotonic() - started)
 
 
-def _announced(flights: int, *, shown: bool) -> Callable[[str, Simulation], FlightProgress]:
-    numbers = itertools.count(1)
+def _until_interrupted(flights: Iterator[_T], flown: list[_T]) -> FlightInterruptedError | None:
+    """Each that ends goes to `flown`; the error of the signal that ended it, None where all were flown."""
+    try:
+        flown.extend(flights)
+    except FlightInterruptedError as err:
+        return err
+    return None
+
+
+def _signal(interrupted: FlightInterruptedError | None) -> str:
+    return "" if interrupted is None else interrupted.signal.name
+
+
+def _leave(interrupted: FlightInterruptedError, flown: str) -> NoReturn:
+    print(f"flightd: interrupted by {interrupted.signal.name} after {flown}", file=sys.stderr, flush=True)
+    raise typer.Exit(128 + interrupted.signal)
+
+
+def _name(row: SweptRow, seeds: Sequence[int]) -> str:
+    hazard: str = row["hazard"]
+    return hazard if len(seeds) == 1 else f"{hazard} with seed {row['seed']}"
+
+
+def _announced(first: int, flights: int, *, shown: bool) -> Callable[[str, Simulation], FlightProgress]:
+    numbers = itertools.count(first)
 
     def observe(hazard: str, simulation: Simulation) -> FlightProgress:
         speed = "lockstep" if simulation.speed is None else "in real time"
@@ -84,24 +116,23 @@ def _announced(flights: int, *, shown: bool) -> Callable[[str, Simulation], Flig
     return observe
 
 
-def _print(flights: Sequence[SweptFlight]) -> None:
+def _print(rows: Sequence[SweptRow]) -> None:
     table = Table(title="Every hazard, flown", title_justify="left")
     for heading in _HEADINGS:
         table.add_column(heading)
-    for flight in flights:
-        v = flight.verdict
+    for row in rows:
         table.add_row(
-            v.hazard,
-            str(flight.simulation.seed),
-            _number(v.found_s, "s"),
-            v.action,
-            " ".join(v.phases[:6]),
-            v.outcome,
-            _number(v.min_clearance_m, "m"),
-            _number(v.off_leg_max_m, "m"),
-            _number(v.max_overshoot_m, "m"),
-            _number(v.down_s, "s"),
-            "; ".join(filter(None, (faults_in_words(map(asdict, v.faults)), flight.error))) or "nothing",
+            row["hazard"],
+            str(row["seed"]),
+            _number(row["found_s"], "s"),
+            row["action"],
+            " ".join(row["phases"][:6]),
+            row["outcome"],
+            _number(row["min_clearance_m"], "m"),
+            _number(row["off_leg_max_m"], "m"),
+            _number(row["max_overshoot_m"], "m"),
+            _number(row["down_s"], "s"),
+            "; ".join(filter(None, (faults_in_words(row["faults"]), row["error"]))) or "nothing",
         )
     Console(file=sys.stdout).print(table)
 

@@ -84,8 +84,9 @@ def sim(
 ) -> None:
     """Fly a whole mission in the simulator and leave its log, report and summary.
 
-    Exit code 0 where the simulator's judge calls the flight good, else 1.  Interrupted (Ctrl-C), it leaves
-    what was flown so far."""
+    Exit code 0 where the simulator's judge calls the flight good, else 1.  Interrupted (Ctrl-C, SIGTERM),
+    it leaves what was flown so far, with 128 and the signal's number.  Of --scenario all each flight's row
+    is in OUT/sweep.jsonl as soon as it ended; interrupted, the same command goes on with the rest."""
     from flightd.app.simulation.prepare import SimOptions
 
     options = SimOptions(
@@ -99,7 +100,9 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
     """One flight, one for each seed, or one for each hazard and seed, in folders of their own."""
     from flightd.app.simulation.prepare import prepare
     from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+    from flightd.app.simulation.sweep_log import SweepLog, asked_of
     from flightd.cli.scenario_sweep import fly_seeds, sweep
+    from flightd.mission.safety.hazard_table import HAZARDS
     from flightd.sim.scenario.scenario import Scenario
     from flightd.sim.scenario.scenario_files import load_scenarios
 
@@ -110,7 +113,12 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
             folder = out / name if seeds == 1 else out / name / f"seed-{seed}"
             return prepare(replace(options, seed=seed), conditions, folder, _say, sweep_route=SHORT_ROUTE)
 
-        sweep(prepared, every, as_json=as_json)
+        by_short_route = replace(options, settings=(SHORT_ROUTE, *options.settings))
+        prepare(
+            by_short_route, Scenario(), out, lambda _: None
+        )  # what cannot be flown at all is refused here
+        asked = asked_of(options, len(HAZARDS) * seeds, seeds)
+        sweep(prepared, every, SweepLog(out / "sweep.jsonl", asked, _say), options.world, as_json=as_json)
         return
     conditions = load_scenarios(scenario) if scenario else Scenario()
     if seeds == 1:

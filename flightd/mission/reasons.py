@@ -24,6 +24,7 @@ class Plain(enum.Enum):
     NO_CELLS = "how many cells the battery has is not known: set battery.cells"
     NO_PICTURE = "no picture from the down camera"
     AISLE_OPEN = "the aisle is not closed"
+    NO_RECORD = "the flight log cannot be written"
     GROUND_SILENT = "the ground station that attends this flight fell silent"
 
 

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from typing import Any
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, Final
+
+_ENDING: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 def end_on_signals(flight: asyncio.Future[Any], came: list[signal.Signals]) -> None:
@@ -16,5 +21,21 @@ def end_on_signals(flight: asyncio.Future[Any], came: list[signal.Signals]) -> N
         came.append(number)
         flight.cancel()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _ENDING:
         loop.add_signal_handler(number, end, number)
+
+
+@contextmanager
+def raised_signals(error: Callable[[signal.Signals], Exception]) -> Iterator[None]:
+    """Either signal raises what `error` makes of it: between two flights, where no loop takes it.  Main
+    thread only."""
+
+    def end(number: int, _: FrameType | None) -> None:
+        raise error(signal.Signals(number))
+
+    before = [(number, signal.signal(number, end)) for number in _ENDING]
+    try:
+        yield
+    finally:
+        for number, handler in before:
+            signal.signal(number, handler)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, TypeAlias
 
 from flightd.app.simulation.judgement import judge_flight
-from flightd.app.simulation.launch import fly
+from flightd.app.simulation.launch import FlightInterruptedError, fly
 from flightd.app.simulation.simulation import Simulation
-from flightd.core.errors import RunError
+from flightd.app.simulation.sweep_log import SweepLog, SweptRow
+from flightd.core.errors import FlightdError
 from flightd.core.snapshot import Snapshot
-from flightd.mission.safety.hazard_table import HAZARDS
+from flightd.mission.safety.hazard_table import HAZARDS, Hazard
+from flightd.runtime.ending_signals import raised_signals
 from flightd.sim.judge.hazard_verdict import HazardVerdict
 from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
@@ -28,18 +31,13 @@ Observe: TypeAlias = Callable[[str, Simulation], AbstractContextManager[Callable
 
 @dataclass(frozen=True, slots=True)
 class SweptFlight:
-    """One hazard's flight; `error` is why it ended early, "" when it did not."""
+    """One hazard's flight; `error` is why it ended early or was not judged, "" when it did not."""
 
     simulation: Simulation
     verdict: HazardVerdict
     error: str
 
-    @property
-    def as_it_should(self) -> bool:
-        """Whether it went as the table of hazards says."""
-        return not (self.verdict.faults or self.error)
-
-    def document(self) -> dict[str, Any]:
+    def document(self) -> SweptRow:
         """As JSON has it."""
         return asdict(self.verdict) | {
             "error": self.error,
@@ -49,19 +47,82 @@ class SweptFlight:
         }
 
 
-def fly_every_hazard(prepare: Prepare, observe: Observe, seeds: Sequence[int]) -> Iterator[SweptFlight]:
-    """Fly what `prepare` makes of each hazard's shipped scenario with each seed, in the table's order."""
+def as_it_should(row: Mapping[str, Any]) -> bool:
+    """Whether it went as the table of hazards says."""
+    return not (row["faults"] or row["error"])
+
+
+def fly_every_hazard(
+    prepare: Prepare, observe: Observe, seeds: Sequence[int], log: SweepLog, world: str
+) -> Iterator[SweptRow]:
+    """Fly what `prepare` makes of each hazard's shipped scenario with each seed, in the table's order; those
+    in `log` are told as they were.  What goes wrong with one is its row's error.  FlightInterruptedError when
+    a signal ends it all."""
     paths = shipped_scenarios()
-    for row in HAZARDS:
-        scenario = load_scenario(paths[row.name])
+    for hazard in HAZARDS:
+        scenario = load_scenario(paths[hazard.name])
         for seed in seeds:
-            simulation = prepare(scenario, row.name, seed)
-            ended = ""
-            with observe(row.name, simulation) as observer:
+            row = log.row(hazard.name, seed)
+            if row is None:
                 try:
-                    fly(replace(simulation, observer=observer))
-                except RunError as err:
-                    ended = str(err)
+                    with raised_signals(_interrupted):
+                        simulation = prepare(scenario, hazard.name, seed)
+                except FlightInterruptedError:
+                    raise
+                except FlightdError as err:
+                    row = _not_flown(hazard, scenario, seed, world, str(err))
+                else:
+                    row = _flown(hazard, simulation, observe).document()
+                log.append(row)
+            yield row
+
+
+def _flown(hazard: Hazard, simulation: Simulation, observe: Observe) -> SweptFlight:
+    errors: list[str] = []
+    for log in (simulation.flight_log, simulation.truth_log):
+        log.unlink(missing_ok=True)  # a flight that does not begin is not judged by an older one's
+    with observe(hazard.name, simulation) as observer:
+        try:
+            fly(replace(simulation, observer=observer))
+        except FlightInterruptedError:
+            raise
+        except FlightdError as err:
+            errors.append(str(err))
+    verdict: HazardVerdict | None = None
+    try:
+        with raised_signals(_interrupted):
             verdict = judge_flight(simulation).hazard
-            assert verdict is not None, "each shipped scenario expects a hazard"
-            yield SweptFlight(simulation, verdict, ended)
+    except FlightInterruptedError:
+        raise
+    except FlightdError as err:
+        errors.append(f"not judged: {err}")
+    return SweptFlight(simulation, verdict or _unjudged(hazard), "; ".join(errors))
+
+
+def _interrupted(number: signal.Signals) -> FlightInterruptedError:
+    return FlightInterruptedError(number, None)
+
+
+def _not_flown(hazard: Hazard, scenario: Scenario, seed: int, world: str, error: str) -> SweptRow:
+    return asdict(_unjudged(hazard)) | {
+        "error": error,
+        "real_time": scenario.needs_real_time,
+        "seed": seed,
+        "world": world,
+    }
+
+
+def _unjudged(hazard: Hazard) -> HazardVerdict:
+    return HazardVerdict(
+        hazard.name,
+        found_s=None,
+        action=hazard.action.value,
+        phases=(),
+        outcome="not judged",
+        down_s=None,
+        min_clearance_m=None,
+        off_leg_max_m=None,
+        max_overshoot_m=None,
+        uncontrolled_s=None,
+        faults=(),
+    )

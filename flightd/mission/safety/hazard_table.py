@@ -45,7 +45,8 @@ PHASE_OF = {
 @dataclass(frozen=True, slots=True)
 class Hazard:
     """One row.  `trigger` is what tells the mission (None: answered below it), `test` where it is flown; the
-    shipped scenario that makes it happen has its `name`."""
+    shipped scenario that makes it happen has its `name`.  `shows_landing`: only a drone that lands meets it,
+    whenever it began."""
 
     name: str
     trigger: Trigger | None
@@ -53,6 +54,7 @@ class Hazard:
     action: Action
     then: str
     test: str
+    shows_landing: bool = False
 
 
 _FAST = "tests/sim/hazards/test_hazards.py"
@@ -228,6 +230,7 @@ HAZARDS: tuple[Hazard, ...] = (
         " never forced. By time: the autopilot's own landing, then given up with an error, still asked to"
         " land",
         "tests/sim/hazards/test_landing_unreported.py",
+        shows_landing=True,
     ),
     Hazard(
         "ceiling_left",

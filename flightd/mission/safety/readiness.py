@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.reasons import (
@@ -29,6 +30,7 @@ def obstacles(s: MissionInputs, config: Config, ground_silent: bool, *, arming: 
     charge, battery = s.charge, config.battery
     cell_v = battery.cell_home_v if charge.loaded else battery.cell_start_v
     found = s.unfit or v.unfit
+    unwritten = s.warnings.health.recorder_error
     checks: tuple[Reason | None, ...] = (
         Plain.ARMED_ALREADY if v.armed and not arming else None,
         None if v.clock_error_s <= clock_s else ClockUnsure(v.clock_error_s, clock_s),
@@ -43,6 +45,7 @@ def obstacles(s: MissionInputs, config: Config, ground_silent: bool, *, arming: 
         LatePictures(latency_s) if s.warnings.frame_age_s > latency_s else None,
         Plain.GROUND_SILENT if ground_silent else None,
         None if s.aisle_closed else Plain.AISLE_OPEN,
+        Plain.NO_RECORD if unwritten and config.hazards.record_lost is not LossAction.CONTINUE else None,
     )
     return tuple(reason for reason in checks if reason is not None)
 

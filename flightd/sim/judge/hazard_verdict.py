@@ -25,8 +25,9 @@ _ENDS = {"landed": {"landed", "home"}, "down": {"landed", "home", "completed"}}
 @dataclass(frozen=True, slots=True)
 class HazardVerdict:
     """One row.  `found_s` counts from the first fault (without faults: from take-off), None when the hazard
-    was not found; `down_s` from there to the floor, None where it asks for no landing or never came down.
-    `faults` are all that was wrong with the flight, those that the scenario expects left out."""
+    was not found; `down_s` from there (unfound: from the fault) to the floor, None where it asks for no
+    landing or never came down.  `faults` are all that was wrong with the flight, those that the scenario
+    expects left out."""
 
     hazard: str
     found_s: float | None
@@ -100,12 +101,13 @@ def _found_s(row: Hazard, events: Sequence[Event], from_ns: int) -> float | None
 
 
 def _down_s(row: Hazard, flight: FlightEvidence, from_ns: int, found_s: float | None) -> float | None:
-    """From the finding until it flies no more; None where the row does not land.  Unfound: from the fault;
-    but where the daemon itself finds nothing, and lands, from when it does."""
+    """From the finding until it flies no more; None where the row does not land.  Unfound: from the fault,
+    whatever the daemon did then, for nobody may hear it; but what shows only while it lands, from when it
+    began to."""
     if row.action not in {Action.LAND, Action.STOP} or not len(flight.in_air):
         return None
     landing = (s.stamp_ns for s in flight.statuses if s.stamp_ns >= from_ns and s.phase is Phase.LAND)
-    if row.trigger is None and (landing_ns := next(landing, None)) is not None:
+    if row.shows_landing and (landing_ns := next(landing, None)) is not None:
         since_s = landing_ns * 1e-9
     else:
         since_s = from_ns * 1e-9 + (found_s or 0.0)

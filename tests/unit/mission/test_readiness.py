@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flightd.core.types import Attitude, LandedState, VehicleState
+from flightd.config.hazards import LossAction
+from flightd.core.types import HEALTHY, Attitude, LandedState, VehicleState
 from flightd.mission.guidance import ALL_WELL, MissionInputs
 from flightd.mission.reasons import in_words
 from flightd.mission.safety.readiness import obstacles
@@ -36,6 +37,17 @@ READY = MissionInputs(
     telemetry_age_s=0.0,
     vehicle=VEHICLE,
 )
+
+
+def test_a_log_that_cannot_be_written_keeps_it_on_the_ground_unless_flights_need_none() -> None:
+    full = replace(ALL_WELL, health=replace(HEALTHY, recorder_error="disk full"))
+    unwritten = replace(READY, warnings=full)
+    for action in LossAction:
+        found = obstacles(
+            unwritten, PARAMS.with_values(hazards={"record_lost": action}), ground_silent=False, arming=False
+        )
+        kept = [] if action is LossAction.CONTINUE else ["the flight log cannot be written"]
+        assert list(map(in_words, found)) == kept
 
 
 def test_late_pictures_keep_it_on_the_ground() -> None:

@@ -34,7 +34,15 @@ def test_what_shows_only_at_the_landing_is_counted_from_there() -> None:
 
 
 def test_where_the_daemon_is_dead_it_is_counted_from_its_death() -> None:
-    found = verdict("companion_dead", [status(0), status(24 * S)], begun_s=24)
+    """Simulated it lives on beside the dead link, takes that for a silent vehicle, holds, and lands."""
+    statuses = [
+        status(0),
+        status(24 * S),
+        status(25 * S, Phase.HOLD),
+        status(27 * S, Phase.LAND),
+        status(92 * S, Phase.ABORTED),
+    ]
+    found = verdict("companion_dead", statuses, begun_s=24)
     assert found.down_s == pytest.approx(66.0, abs=1.1)
     assert "down_late" in {fault.kind for fault in found.faults}
 

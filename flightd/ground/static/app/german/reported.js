@@ -113,6 +113,7 @@ export default {
   "the vehicle's clock is {known}, {limit} ms are needed": "die Uhr des Fluggeräts ist {known}, nötig sind {limit} ms",
   "{why}; paused besides, until resume": "{why}; außerdem Pause, bis es weitergeht",
   "not fit to fly: {found}": "nicht flugbereit: {found}",
+  "the check of this computer does not end (see whether its disk answers)": "die Prüfung dieses Rechners endet nicht (antwortet sein Datenträger?)",
   "arms in {seconds} s; pause takes the start back": "wird in {seconds} s scharf; Pause nimmt den Start zurück",
   "pictures are more than {limit} ms old when they have been looked at": "Bilder sind mehr als {limit} ms alt, wenn sie ausgewertet sind",
   "no picture of a shelf was read at the last {blind} of {scans} scans": "kein Regalbild wurde bei den letzten {blind} von {scans} Lesungen gelesen",

@@ -1,0 +1,229 @@
+"""`flightd sim --scenario all` and `--seeds`, by flights that only pretend: what is kept, told, returned."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from flightd.app.simulation.launch import FlightInterruptedError
+from flightd.app.simulation.simulation import Simulation
+from flightd.cli.main import main
+from flightd.core.errors import FlightdError, InputError, RunError, UnavailableError
+from flightd.mission.safety.hazard_table import HAZARDS
+from flightd.sim.judge.hazard_verdict import HazardVerdict
+from flightd.sim.judge.verdict import JudgedFault
+
+Run = Callable[..., tuple[int, str, str]]
+FIRST, SECOND, THIRD = (row.name for row in HAZARDS[:3])
+
+
+class Flights:
+    """What is flown, by hazard and seed; at a number of flight something may happen, in the air or after."""
+
+    def __init__(self) -> None:
+        self.flown: list[tuple[str, int]] = []
+        self.raising: dict[int, FlightdError] = {}
+        self.judging: dict[int, Callable[[], object]] = {}
+        self.bad: set[str] = set()
+
+    def fly(self, simulation: Simulation) -> SimpleNamespace:
+        if error := self.raising.get(len(self.flown) + 1):
+            self.flown.append((self._hazard(simulation), simulation.seed))
+            raise error
+        self.flown.append((self._hazard(simulation), simulation.seed))
+        return SimpleNamespace(phase="done")
+
+    def judge(self, simulation: Simulation) -> SimpleNamespace:
+        self.judging.get(len(self.flown), lambda: None)()
+        name = self._hazard(simulation)
+        faults = (JudgedFault("hit_rack", 3.0, 0.1),) if name in self.bad else ()
+        verdict = HazardVerdict(name, 0.5, "land", ("land",), "landed", 9.0, 1.0, 0.1, 0.1, 0.0, faults)
+        return SimpleNamespace(hazard=verdict)
+
+    @staticmethod
+    def _hazard(simulation: Simulation) -> str:
+        assert simulation.scenario.expect is not None
+        return simulation.scenario.expect.hazard
+
+
+@pytest.fixture
+def flights(monkeypatch: pytest.MonkeyPatch) -> Flights:
+    pretended = Flights()
+    monkeypatch.setattr("flightd.app.simulation.scenario_sweep.fly", pretended.fly)
+    monkeypatch.setattr("flightd.app.simulation.scenario_sweep.judge_flight", pretended.judge)
+    return pretended
+
+
+@pytest.fixture
+def sim(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Exit code, stdout and stderr of `flightd sim --out TMP` with more arguments."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["flightd", "sim", "--out", str(tmp_path), *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        return int(ended.value.code or 0), printed.out, printed.err
+
+    return run
+
+
+def kept(folder: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (folder / "sweep.jsonl").read_text().splitlines()[1:]]
+
+
+def test_every_hazard_is_flown_with_every_seed_and_kept(flights: Flights, sim: Run, tmp_path: Path) -> None:
+    code, out, _ = sim("--scenario", "all", "--seed", "4", "--seeds", "2", "--json")
+    assert code == 0
+    assert flights.flown == [(row.name, seed) for row in HAZARDS for seed in (4, 5)]
+    told = json.loads(out)
+    assert (told["wrong"], told["interrupted"]) == ([], "")
+    assert told["flights"] == kept(tmp_path)
+    assert (tmp_path / FIRST / "seed-5").is_dir()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_in_flight_ends_it_all_and_the_same_command_goes_on(
+    flights: Flights, sim: Run, tmp_path: Path, number: signal.Signals
+) -> None:
+    flights.raising[3] = FlightInterruptedError(number, None)
+    code, out, err = sim("--scenario", "all", "--json")
+    assert code == 128 + number
+    assert [name for name, _ in flights.flown] == [FIRST, SECOND, THIRD]
+    assert f"interrupted by {number.name} after 2 of {len(HAZARDS)} flights" in err
+    told = json.loads(out)
+    assert [row["hazard"] for row in told["flights"]] == [FIRST, SECOND]
+    assert told["interrupted"] == number.name
+    assert told["flights"] == kept(tmp_path)
+
+    flights.raising.clear()
+    flights.flown.clear()
+    code, out, err = sim("--scenario", "all", "--json")
+    assert code == 0
+    assert [name for name, _ in flights.flown] == [row.name for row in HAZARDS[2:]]
+    assert f"goes on after 2 of {len(HAZARDS)} flights" in err
+    assert f"3 of {len(HAZARDS)}: {THIRD}" in err
+    assert [row["hazard"] for row in json.loads(out)["flights"]] == [row.name for row in HAZARDS]
+
+
+def test_a_signal_while_a_flight_is_judged_ends_it_all(flights: Flights, sim: Run, tmp_path: Path) -> None:
+    flights.judging[2] = lambda: os.kill(os.getpid(), signal.SIGTERM)
+    before = signal.getsignal(signal.SIGTERM)
+    code, out, _ = sim("--scenario", "all")
+    assert code == 128 + signal.SIGTERM
+    assert "Every hazard, flown" in out
+    assert [row["hazard"] for row in kept(tmp_path)] == [FIRST]
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_an_error_of_one_flight_is_its_own(flights: Flights, sim: Run) -> None:
+    errors = [UnavailableError("no port"), RunError("no end"), InputError("no log")]
+    flights.raising.update(enumerate(errors, start=1))
+    flights.bad.add(THIRD)
+    code, out, err = sim("--scenario", "all", "--seeds", "2", "--json")
+    assert code == 1
+    assert len(flights.flown) == 2 * len(HAZARDS)
+    told = json.loads(out)
+    assert [row["error"] for row in told["flights"][:4]] == [*map(str, errors), ""]
+    wrong = [f"{name} with seed {seed}" for name in (FIRST, SECOND, THIRD) for seed in (1, 2)]
+    wrong.remove(f"{SECOND} with seed 2")
+    assert told["wrong"] == wrong
+    assert f"5 of {2 * len(HAZARDS)} did not go as the table says: {', '.join(wrong)}" in err
+
+
+def test_a_flight_that_cannot_be_judged_is_told_as_such(flights: Flights, sim: Run, tmp_path: Path) -> None:
+    def no_log() -> None:
+        raise InputError("cannot open the flight log")
+
+    flights.raising[2], flights.judging[2] = UnavailableError("no port"), no_log
+    code, out, _ = sim("--scenario", "all")
+    assert code == 1
+    row = kept(tmp_path)[1]
+    assert (row["hazard"], row["outcome"], row["found_s"]) == (SECOND, "not judged", None)
+    assert row["error"] == "no port; not judged: cannot open the flight log"
+    assert "Every hazard, flown" in out
+
+
+def test_what_this_vehicle_cannot_have_is_its_rows_error(flights: Flights, sim: Run) -> None:
+    """An AR.Drone has no companion that its autopilot could miss."""
+    code, out, _ = sim("--scenario", "all", "--vehicle", "ardrone", "--json")
+    assert code == 1
+    errors = {row["hazard"]: row["error"] for row in json.loads(out)["flights"]}
+    assert "companion_dead" in errors["companion_dead"]
+    assert errors["camera_frozen"] == ""
+    assert len(flights.flown) == sum(not error for error in errors.values())
+
+
+def test_what_cannot_be_flown_at_all_is_refused_at_once(flights: Flights, sim: Run) -> None:
+    code, out, err = sim("--scenario", "all", "--set", "mission.height_m=high")
+    assert (code, out, flights.flown) == (2, "", [])
+    assert "mission.height_m" in err
+
+
+def test_a_list_is_left_alone_that_other_options_began(flights: Flights, sim: Run, tmp_path: Path) -> None:
+    flights.raising[2] = FlightInterruptedError(signal.SIGINT, None)
+    sim("--scenario", "all")
+    begun = (tmp_path / "sweep.jsonl").read_bytes()
+    code, out, err = sim("--scenario", "all", "--world", "rough")
+    assert (code, out) == (2, "")
+    assert f"holds 1 of {len(HAZARDS)} flights of another sweep (world); give another --out" in err
+    assert (tmp_path / "sweep.jsonl").read_bytes() == begun
+
+
+def test_a_line_that_was_being_written_is_flown_again(flights: Flights, sim: Run, tmp_path: Path) -> None:
+    flights.raising[3] = FlightInterruptedError(signal.SIGINT, None)
+    sim("--scenario", "all")
+    path = tmp_path / "sweep.jsonl"
+    path.write_bytes(path.read_bytes()[:-20])
+    flights.raising.clear()
+    flights.flown.clear()
+    assert sim("--scenario", "all")[0] == 0
+    assert flights.flown[0][0] == SECOND
+    assert [row["hazard"] for row in kept(tmp_path)] == [row.name for row in HAZARDS]
+
+
+def test_a_sweep_that_was_flown_to_its_end_begins_anew(flights: Flights, sim: Run, tmp_path: Path) -> None:
+    sim("--scenario", "all")
+    assert sim("--scenario", "all", "--world", "rough")[0] == 0
+    assert len(flights.flown) == 2 * len(HAZARDS)
+    assert len(kept(tmp_path)) == len(HAZARDS)
+
+
+def test_a_file_that_is_no_such_list_is_refused(flights: Flights, sim: Run, tmp_path: Path) -> None:
+    (tmp_path / "sweep.jsonl").write_text("something else\n")
+    code, _, err = sim("--scenario", "all")
+    assert (code, flights.flown) == (2, [])
+    assert "sweep.jsonl: is no list of a sweep's flights" in err
+
+
+def test_a_signal_ends_the_flights_of_many_seeds_too(
+    sim: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    summary = {
+        "mission": "completed", "reason": "", "nodes_visited": 1, "nodes_planned": 1, "faults": [],
+        "cross_track_rms_m": 0.1, "min_clearance_m": 1.0, "verdict": "good",
+    }  # fmt: skip
+
+    def fly(simulation: Simulation) -> object:
+        if simulation.seed == 2:
+            raise FlightInterruptedError(signal.SIGTERM, None)
+        return object()
+
+    monkeypatch.setattr("flightd.cli.scenario_sweep.fly", fly)
+    monkeypatch.setattr(
+        "flightd.cli.scenario_sweep.write_results", lambda flight, *_: {**summary, "seed": flight.seed}
+    )
+    code, out, err = sim("--seeds", "3", "--json")
+    assert code == 128 + signal.SIGTERM
+    told = json.loads(out)
+    assert [flight["seed"] for flight in told["flights"]] == [1]
+    assert told["interrupted"] == "SIGTERM"
+    assert "interrupted by SIGTERM after 1 flight\n" in err
