@@ -64,6 +64,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         ],
         armed=armed or None,
         piloted=any(note["kind"] == "pilot" for note in begun) or bool(simulation.truth_url),
+        lost=int(flown.metadata.get("dropped", "0")) + bool(flown.damage),
     )
     figures = score(evidence)
     stock = stock_summary(simulation, meant, figures.flight_time_s)

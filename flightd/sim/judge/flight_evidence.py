@@ -20,7 +20,7 @@ class FlightEvidence:
     """`site` as it really is; `statuses`, `events` and `setpoints` (those that went out) are the
     daemon's, `truth` and `armed` the simulator's; all in time order.  `armed` is None where the vehicle does
     not tell.  `piloted`: there was a pilot who could take over; where there was none a hand-over is the
-    autopilot's failsafe, and still judged."""
+    autopilot's failsafe, and still judged.  `lost`: messages that the flight log did not take."""
 
     site: Site
     plan: FlightPlan
@@ -30,6 +30,7 @@ class FlightEvidence:
     setpoints: Sequence[AttitudeSetpoint] = ()
     armed: Sequence[ArmedChange] | None = None
     piloted: bool = True
+    lost: int = 0
 
     @cached_property
     def handed_over_ns(self) -> float:

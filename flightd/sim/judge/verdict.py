@@ -53,6 +53,7 @@ KINDS = {
     "leaned_on_floor": f"commanded to lean by more than {_LEANS_DEG:g} deg while it stands, motors on, deg",
     "stayed_up": "in the air at the end, m above the floor",
     "stayed_armed": f"armed on the floor for more than {_STAYS_ARMED_S:g} s, or at the end, s",
+    "record_lost": "messages that the flight log did not take, or its end, number",
     "aborted": "the mission was not completed, nodes left",
     "miscounted": "nodes visited that were others",
     "not_visited": "planned nodes that a completed mission left out",
@@ -93,6 +94,7 @@ def judged(
     """All faults of a flight, in the order of `KINDS`."""
     end_s = float(flight.truth[-1].stamp_ns * 1e-9) - flight.begun_s if flight.truth else 0.0
     counts = {
+        "record_lost": flight.lost,
         "miscounted": score.nodes_miscounted,
         "codes_wrong": codes_wrong,
         "empty_wrong": empty_wrong,

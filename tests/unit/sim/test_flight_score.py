@@ -206,6 +206,7 @@ def test_counts_that_are_wrong_are_bad_and_a_flight_without_fault_is_good() -> N
     assert judged(good, score(good)) == []
     wrong = judged(good, score(good), codes_wrong=2, empty_wrong=1)
     assert [(fault.kind, fault.value) for fault in wrong] == [("codes_wrong", 2.0), ("empty_wrong", 1.0)]
+    assert kinds(replace(good, lost=3)) == {"record_lost": 3.0}
     elsewhere = replace(good, truth=landed(at(S, 0.0), at(4 * S, 2.7), at(7 * S, 0.0)))
     assert kinds(elsewhere)["miscounted"] == 1.0
 
