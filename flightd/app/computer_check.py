@@ -28,10 +28,14 @@ class CheckHangs(Refusal):
         return "the check of this computer does not end (see whether its disk answers)"
 
 
+def look_at_machine(config: Config) -> list[Check]:
+    """The computer itself.  Blocks for the disk."""
+    return [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
+
+
 def look_here(config: Config, site: Site) -> list[Check]:
     """All that can be looked at without moving or asking anything.  Blocks for the disk."""
-    checks = [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
-    return [*checks, *check_calibration(config.camera, site, config.mission.height_m)]
+    return [*look_at_machine(config), *check_calibration(config.camera, site, config.mission.height_m)]
 
 
 class ComputerCheck:

@@ -22,7 +22,7 @@ from flightd.adapters.store.settings_file import SettingsFile
 from flightd.app import service
 from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
 from flightd.app.build import build, detector_pool, ground_link
-from flightd.app.computer_check import ComputerCheck, look_here
+from flightd.app.computer_check import ComputerCheck, look_at_machine, look_here
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.flight_identity import FlightIdentity
@@ -36,7 +36,6 @@ from flightd.core.errors import InputError, TransientError
 from flightd.core.learnt import LearntSensors
 from flightd.core.snapshot import Snapshot
 from flightd.doctor.check import CheckLevel
-from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.ports import Recorder
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
@@ -193,8 +192,7 @@ async def _settled(file: SettingsFile) -> None:
 
 def _failing(config: Config) -> set[str]:
     """The names of the checks of this computer that fail now.  Blocks for the disk."""
-    checks = [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
-    return {check.name for check in checks if check.level is CheckLevel.ERROR}
+    return {check.name for check in look_at_machine(config) if check.level is CheckLevel.ERROR}
 
 
 @asynccontextmanager

@@ -113,10 +113,8 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
             folder = out / name if seeds == 1 else out / name / f"seed-{seed}"
             return prepare(replace(options, seed=seed), conditions, folder, _say, sweep_route=SHORT_ROUTE)
 
-        by_short_route = replace(options, settings=(SHORT_ROUTE, *options.settings))
-        prepare(
-            by_short_route, Scenario(), out, lambda _: None
-        )  # what cannot be flown at all is refused here
+        # what cannot be flown at all is refused here
+        prepare(options, Scenario(), out, lambda _: None, sweep_route=SHORT_ROUTE)
         asked = asked_of(options, len(HAZARDS) * seeds, seeds)
         sweep(prepared, every, SweepLog(out / "sweep.jsonl", asked, _say), options.world, as_json=as_json)
         return

@@ -10,13 +10,14 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 def utc_text(utc_ns: int) -> str:
     """ISO 8601 with milliseconds and Z."""
-    return _at(utc_ns).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    return utc_time(utc_ns).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def utc_day(utc_ns: int) -> date:
     """The day in UTC."""
-    return _at(utc_ns).date()
+    return utc_time(utc_ns).date()
 
 
-def _at(utc_ns: int) -> datetime:
+def utc_time(utc_ns: int) -> datetime:
+    """To the microsecond below."""
     return _EPOCH + timedelta(microseconds=utc_ns // 1000)

@@ -10,6 +10,18 @@ from flightd.runtime.durable_files import replace_file, sync_folder
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, picture_name
 
 
+def evidence_name(jpeg: bytes) -> str:
+    """The name under which a picture is kept.  ValueError above 50 KB."""
+    if len(jpeg) > MOST_BYTES:
+        raise ValueError(f"evidence of {len(jpeg)} bytes; at most {MOST_BYTES} are kept")
+    return picture_name(jpeg)
+
+
+def evidence_file(name: str) -> str:
+    """Where the picture `name` is in its folder: ab/abcd….jpg."""
+    return f"{name[:2]}/{name}.jpg"
+
+
 class EvidenceFolder:
     """Pictures by content: FOLDER/ab/abcd….jpg.  The same picture twice is one file."""
 
@@ -18,15 +30,13 @@ class EvidenceFolder:
 
     def path(self, name: str) -> Path:
         """Where the picture `name` is, or would be."""
-        return self._folder / name[:2] / f"{name}.jpg"
+        return self._folder / evidence_file(name)
 
     def keep(self, jpeg: bytes) -> str:
         """Write a picture through to the disk and return its name.
 
         Raises ValueError above 50 KB and UnavailableError when the disk refuses."""
-        if len(jpeg) > MOST_BYTES:
-            raise ValueError(f"evidence of {len(jpeg)} bytes; at most {MOST_BYTES} are kept")
-        name = picture_name(jpeg)
+        name = evidence_name(jpeg)
         target = self.path(name)
         if target.exists():
             return name

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any, Final, TypeAlias
 
 from flightd.app.simulation.judgement import judge_flight
@@ -27,24 +27,6 @@ Prepare: TypeAlias = Callable[[Scenario, str, int], Simulation]
 """Makes the flight of a scenario, a hazard's name and a seed."""
 Observe: TypeAlias = Callable[[str, Simulation], AbstractContextManager[Callable[[Snapshot], None]]]
 """Gives, for the hazard that is flown now, what looks on."""
-
-
-@dataclass(frozen=True, slots=True)
-class SweptFlight:
-    """One hazard's flight; `error` is why it ended early or was not judged, "" when it did not."""
-
-    simulation: Simulation
-    verdict: HazardVerdict
-    error: str
-
-    def document(self) -> SweptRow:
-        """As JSON has it."""
-        return asdict(self.verdict) | {
-            "error": self.error,
-            "real_time": self.simulation.speed is not None,
-            "seed": self.simulation.seed,
-            "world": self.simulation.unknowns.kind,
-        }
 
 
 def as_it_should(row: Mapping[str, Any]) -> bool:
@@ -70,14 +52,14 @@ def fly_every_hazard(
                 except FlightInterruptedError:
                     raise
                 except FlightdError as err:
-                    row = _not_flown(hazard, scenario, seed, world, str(err))
+                    row = _row(_unjudged(hazard), str(err), scenario.needs_real_time, seed, world)
                 else:
-                    row = _flown(hazard, simulation, observe).document()
+                    row = _flown(hazard, simulation, observe)
                 log.append(row)
             yield row
 
 
-def _flown(hazard: Hazard, simulation: Simulation, observe: Observe) -> SweptFlight:
+def _flown(hazard: Hazard, simulation: Simulation, observe: Observe) -> SweptRow:
     errors: list[str] = []
     for log in (simulation.flight_log, simulation.truth_log):
         log.unlink(missing_ok=True)  # a flight that does not begin is not judged by an older one's
@@ -96,20 +78,16 @@ def _flown(hazard: Hazard, simulation: Simulation, observe: Observe) -> SweptFli
         raise
     except FlightdError as err:
         errors.append(f"not judged: {err}")
-    return SweptFlight(simulation, verdict or _unjudged(hazard), "; ".join(errors))
+    by_clock, world = simulation.speed is not None, simulation.unknowns.kind
+    return _row(verdict or _unjudged(hazard), "; ".join(errors), by_clock, simulation.seed, world)
 
 
 def _interrupted(number: signal.Signals) -> FlightInterruptedError:
     return FlightInterruptedError(number, None)
 
 
-def _not_flown(hazard: Hazard, scenario: Scenario, seed: int, world: str, error: str) -> SweptRow:
-    return asdict(_unjudged(hazard)) | {
-        "error": error,
-        "real_time": scenario.needs_real_time,
-        "seed": seed,
-        "world": world,
-    }
+def _row(verdict: HazardVerdict, error: str, by_clock: bool, seed: int, world: str) -> SweptRow:
+    return asdict(verdict) | {"error": error, "real_time": by_clock, "seed": seed, "world": world}
 
 
 def _unjudged(hazard: Hazard) -> HazardVerdict:

@@ -66,7 +66,7 @@ class TrafficControl:
         """Whether nobody else may be in this air now, or was released into it."""
         wanted = frozenset(air)
         near = wanted.union(*(self.conflicts[resource] for resource in wanted))
-        zones = self._zones()
+        zones = self.closed_by()
         return all(
             near.isdisjoint(course.wreck or course.air) and wanted.isdisjoint(zones.get(other, ()))
             for other, course in self.drones.items()
@@ -110,7 +110,7 @@ class TrafficControl:
     def release(self, now_ms: int, comes_home: ComesHome | None = None) -> dict[str, list[Action]]:
         """What each drone may do beyond what it was told: all that its predecessors are done for, as far as
         the horizon, and no further than it `comes_home` from."""
-        zones = self._zones()
+        zones = self.closed_by()
         told: dict[str, list[Action]] = {}
         for drone, course in self.drones.items():
             if course.failed or course.doubt_m > 0.0:
@@ -136,8 +136,9 @@ class TrafficControl:
             return False
         return all(self.drones[other].done > its for other, its in self._graph.waits_for((drone, number)))
 
-    def _zones(self) -> dict[str, frozenset[int]]:
-        """The grown cells of the drones whose position is doubted, and the air of those that roam."""
+    def closed_by(self) -> dict[str, frozenset[int]]:
+        """Into which air nobody else is released on account of each drone: the grown cells of those whose
+        position is doubted, and the air of those that roam."""
         return {
             drone: self._avoided[drone] if course.roams else self._zone(course)
             for drone, course in self.drones.items()
@@ -148,15 +149,11 @@ class TrafficControl:
         reach_m = self._cell.separation_m + course.doubt_m
         return within(self.lanes, course.air, reach_m, self._cell.upright_m)
 
-    def closed_by(self) -> Mapping[str, frozenset[int]]:
-        """Into which air nobody else is released on account of each drone that is doubted, or roams."""
-        return self._zones()
-
     def paused(self) -> frozenset[str]:
         """The drones that must stand where they are: in doubt themselves, or released into a grown cell that
         they are not in yet."""
         found = {drone for drone, course in self.drones.items() if course.doubt_m > 0.0}
-        for doubted, zone in self._zones().items():
+        for doubted, zone in self.closed_by().items():
             for drone, course in self.drones.items():
                 if drone != doubted and any(action.resource in zone for action in course.base):
                     found.add(drone)

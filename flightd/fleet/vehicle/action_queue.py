@@ -48,8 +48,9 @@ class ActionQueue:
     def failure_of(self, action_id: str) -> str | None:
         """Why one failed, as far as that was told; None where it did not."""
         tracked = self._all.get(action_id)
-        failed = tracked is not None and tracked.status is ActionStatus.FAILED
-        return (tracked.result or "") if tracked is not None and failed else None
+        if tracked is None or tracked.status is not ActionStatus.FAILED:
+            return None
+        return tracked.result or ""
 
     @property
     def runs(self) -> bool:

@@ -239,8 +239,8 @@ class FleetDrone:
         status, vehicle = self.drone.status, self.drone.vehicle
         told = () if status is None else status.way
         base = [self._node_of(step) for step in self._base]
-        holds = self.drone.is_heard and status is not None and status.phase is Phase.HOLD
-        holds = holds and status is not None and status.position is not None
+        is_held = status is not None and status.phase is Phase.HOLD and status.position is not None
+        holds = self.drone.is_heard and is_held
         self.air.close([(vehicle.last_node, *vehicle.ahead), told, base], self._doubt_m(status), holds=holds)
 
     @property

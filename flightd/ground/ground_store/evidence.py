@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
-from flightd.adapters.store.evidence_pictures import EvidenceFolder
+from flightd.adapters.store.evidence_pictures import EvidenceFolder, evidence_file, evidence_name
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.plain_files import plain_file
 from flightd.ground.shared_folder import SharedFolder
@@ -58,9 +58,7 @@ class SharedEvidence:
         return self._folder.has(_at(name))
 
     def keep(self, jpeg: bytes) -> str:
-        if len(jpeg) > MOST_BYTES:
-            raise ValueError(f"evidence of {len(jpeg)} bytes; at most {MOST_BYTES} are kept")
-        name = picture_name(jpeg)
+        name = evidence_name(jpeg)
         if not self.has(name):
             self._folder.write(_at(name), jpeg)
         return name
@@ -76,7 +74,7 @@ class SharedEvidence:
 
 
 def _at(name: str) -> str:
-    return f"{checked(name)[:2]}/{name}.jpg"
+    return evidence_file(checked(name))
 
 
 class NoEvidence:

@@ -13,13 +13,14 @@ import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Final, Protocol
 
 from flightd.adapters.ground_link.messages.answers import Accepted, Planned, Welcome
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.errors import FlightdError, InputError, RunError
 from flightd.core.types import CommandKind, Phase
+from flightd.core.utc_time import utc_time
 from flightd.fleet.schedule.due import LOOK_BACK, decide
 from flightd.fleet.schedule.rule import MOST_WINDOW, Occurrence
 from flightd.ground.access.roles import Identity, Role
@@ -155,7 +156,7 @@ class NightShift:
 
     async def _look(self, schedule: Schedule) -> bool:
         """Whether a run is due, or ordered and unanswered, so that the station attends."""
-        now = datetime.fromtimestamp(self._clock.utc_ns() / 1e9, UTC)
+        now = utc_time(self._clock.utc_ns())
         oldest = (now - LOOK_BACK - 2 * MOST_WINDOW).date()
         runs = {
             run.day: run for run in await self._threads.run(self._book.runs, schedule.id, MOST_RUNS, oldest)
@@ -165,7 +166,7 @@ class NightShift:
             await self._resume(schedule, run, now)
         if not schedule.kept.enabled:
             return bool(unanswered)
-        since = datetime.fromtimestamp(schedule.since_ns / 1e9, UTC)
+        since = utc_time(schedule.since_ns)
         ordered = [day for day, run in runs.items() if run.state in ORDERED]
         told = [day for day, run in runs.items() if run.state is RunState.MISSED]
         decision = decide(schedule.rule, since, ordered, told, now)

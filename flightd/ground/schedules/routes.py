@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import UTC, date, datetime
+from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from flightd.core.errors import FlightdError, InputError
+from flightd.core.utc_time import utc_time
 from flightd.ground.access.gate import note_act
 from flightd.ground.bounded import Threads
 from flightd.ground.json_http import AnswerTo, as_json, or_refused, said
@@ -99,7 +100,7 @@ class _Desk:
         return [told(schedule, now, book.runs(schedule.id, 1)) for schedule in book.schedules(site)]
 
     def _now(self) -> datetime:
-        return datetime.fromtimestamp(self._utc_ns() / 1e9, UTC)
+        return utc_time(self._utc_ns())
 
     def _kept_in(self) -> ScheduleBook:
         if self._book is None:

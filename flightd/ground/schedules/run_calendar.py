@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from datetime import UTC, date, datetime, timedelta
+from datetime import date, datetime, timedelta
 from typing import Any
 
 from flightd.core.errors import InputError
+from flightd.core.utc_time import utc_time
 from flightd.fleet.schedule.rule import Occurrence, Rule
 from flightd.ground.schedules.kept import Schedule
 from flightd.ground.schedules.schedule_book import Run
@@ -35,7 +36,7 @@ def calendar_of(
     rule = schedule.rule
     last = first + timedelta(days=days - 1)
     known = {run.day: run for run in runs if first <= run.day <= last}
-    told = [_told(schedule, rule, run.day, _utc(run.due_ns), run) for run in known.values()]
+    told = [_told(schedule, rule, run.day, utc_time(run.due_ns), run) for run in known.values()]
     told += [
         _told(schedule, rule, one.day, one.at, None, _MISSED if one.until <= now else _DUE)
         for one in _unknown(schedule, rule, first, days, now)
@@ -47,7 +48,7 @@ def calendar_of(
 def _unknown(schedule: Schedule, rule: Rule, first: date, days: int, now: datetime) -> Iterator[Occurrence]:
     """What comes by the rule, but for what was before the schedule was kept; of one that is suspended nothing
     is missed."""
-    since = _utc(schedule.since_ns)
+    since = utc_time(schedule.since_ns)
     for one in rule.of_days(first, days):
         if one.at >= since and (schedule.kept.enabled or one.at >= now):
             yield one
@@ -72,7 +73,3 @@ def _told(
         "why": "" if run is None else run.why,
         "plan": "" if run is None else run.plan,
     }
-
-
-def _utc(ns: int) -> datetime:
-    return datetime.fromtimestamp(ns / 1e9, UTC)

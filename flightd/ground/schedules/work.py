@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from typing import Any
 
 from flightd.adapters.ground_link.messages.floor import FloorNode, FloorStatus
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
 from flightd.core.planned_flight import MOST_NODES
+from flightd.core.utc_time import utc_time
 from flightd.fleet.schedule.rolling import NodeCount, run_nodes
 from flightd.ground.ground_store.pages import MOST_ROWS
 from flightd.ground.ground_store.store import GroundStore
@@ -90,7 +91,7 @@ def _counts(floor: FloorStatus, stock: Sequence[dict[str, Any]]) -> list[NodeCou
             exceptions.add(node)
         ns = place["utc_ns"]
         never = ns is None or state is LocationState.NOT_VISITED
-        at = None if never else datetime.fromtimestamp(ns / 1e9, UTC)
+        at = None if never else utc_time(ns)
         before = oldest.get(node, at)
         oldest[node] = None if at is None or before is None else min(at, before)
     return [

@@ -7,7 +7,7 @@ from typing import Any
 
 from flightd.core.types import Phase
 from flightd.ground.fleet.traffic_view import MOST_AHEAD, MOST_DONE
-from tests.unit.ground.test_own_fleet import PaperFleet, fly, on_way_to, until
+from tests.rigs.paper_fleet import PaperFleet, fly, on_way_to, until
 
 
 def test_what_is_planned_stands_against_time_and_what_is_done_is_told_after_it() -> None:

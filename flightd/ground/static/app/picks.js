@@ -13,3 +13,12 @@ export function aislesOf({ nodes }) {
   found.delete("");
   return [...found];
 }
+
+// What is chosen once one of it is pressed.
+export const toggled = (chosen, one) => (chosen.includes(one) ? chosen.filter((other) => other !== one) : [...chosen, one]);
+
+// The same with some at once: all of them, or none where all are chosen already.
+export function toggledAll(chosen, some) {
+  const others = chosen.filter((one) => !some.includes(one));
+  return some.every((one) => chosen.includes(one)) ? others : [...chosen, ...some.filter((one) => !chosen.includes(one))];
+}

@@ -2,6 +2,7 @@
 // for, the calendar, and STOP for all.
 import { askJson, askStation, isGivenUp } from "../fetching.js";
 import { english } from "../language.js";
+import { toggled, toggledAll } from "../picks.js";
 import { state, update } from "../store.js";
 
 const EMPTY = {
@@ -28,17 +29,8 @@ export function change(changes) {
 
 export const choose = (chosen) => change({ chosen, asked: null });
 
-export function toggleNode(id) {
-  const { chosen } = fleet();
-  choose(chosen.includes(id) ? chosen.filter((other) => other !== id) : [...chosen, id]);
-}
-
-// All of these nodes, or none of them where all are chosen already.
-export function toggleNodes(ids) {
-  const { chosen } = fleet();
-  const all = ids.every((id) => chosen.includes(id));
-  choose(all ? chosen.filter((id) => !ids.includes(id)) : [...chosen, ...ids.filter((id) => !chosen.includes(id))]);
-}
+export const toggleNode = (id) => choose(toggled(fleet().chosen, id));
+export const toggleNodes = (ids) => choose(toggledAll(fleet().chosen, ids));
 
 const NO_FLEET = 404;
 

@@ -1,5 +1,6 @@
 // What the page Missions knows: what is chosen, what the drone makes of it, and the missions that are kept.
 import { english } from "../language.js";
+import { toggled, toggledAll } from "../picks.js";
 import { state, update } from "../store.js";
 
 const EMPTY = {
@@ -44,25 +45,9 @@ export function enter(site) {
 // What is chosen becomes another choice; an estimate is asked for anew.
 export const choose = (changes) => change({ ...BY_HAND, flying: "", ...changes });
 
-export function toggleNode(id) {
-  const { nodes } = missions();
-  choose({ nodes: nodes.includes(id) ? nodes.filter((other) => other !== id) : [...nodes, id] });
-}
-
-// All of these nodes, or none of them where all are chosen already.
-export function toggleNodes(ids) {
-  const { nodes } = missions();
-  const all = ids.every((id) => nodes.includes(id));
-  choose({
-    nodes: all ? nodes.filter((id) => !ids.includes(id)) : [...nodes, ...ids.filter((id) => !nodes.includes(id))],
-  });
-}
-
-export function toggleLevel(level) {
-  const { levels } = missions();
-  const next = levels.includes(level) ? levels.filter((other) => other !== level) : [...levels, level];
-  choose({ levels: next.sort((a, b) => a - b) });
-}
+export const toggleNode = (id) => choose({ nodes: toggled(missions().nodes, id) });
+export const toggleNodes = (ids) => choose({ nodes: toggledAll(missions().nodes, ids) });
+export const toggleLevel = (level) => choose({ levels: toggled(missions().levels, level).sort((a, b) => a - b) });
 
 export const open = ({ id, name, nodes, levels }) =>
   change({ id, name, nodes, levels, best: false, ...BY_HAND, flying: "", trouble: "" });
