@@ -31,8 +31,8 @@ _CLIMBS_UNSEEING_S = 1.0
 _OFF_FLOOR_M = 0.5
 """Below, a picture may well stay the same: of the pad itself, packed so that its noise is gone."""
 _RISES_UNSEEING_M, _RISES_UNSEEING_SHARE = 1.0, 0.65
-"""So high, or so far up to its flying height, a take-off goes on that has not seen any line of the map: nothing
-steers it, and what it drifts by grows with the square of the time."""
+"""So high, or so far up to its flying height, goes a take-off that has not seen any line of the map: nothing
+steers it, and it drifts by the square of the time."""
 _JUMPED = 2
 """So many attitudes with a senseless time are no stray datagram."""
 
@@ -192,9 +192,8 @@ class HazardMonitor:
         elif lost and self._unseen_ns is None:
             self._unseen_ns = s.now_ns
         self.unseen_s = 0.0 if self._unseen_ns is None else (s.now_ns - self._unseen_ns) * 1e-9
-        if situation.takes_off and self._rises_unseeing(s):
-            return {Trigger.LINES_LOST_LONG}
-        if lost and (self.unseen_s > p.lines_land_s or self.blind.too_long):
+        too_long = self.unseen_s > p.lines_land_s or self.blind.too_long
+        if self._rises_unseeing(s) if situation.takes_off else lost and too_long:
             return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}
         if lost:
             return {Trigger.LINES_LOST}
