@@ -36,7 +36,8 @@ _MAP_SIGMA_M = 0.02
 _SILENT_S = 0.1
 """A vehicle whose newest attitude is older than usual by so much is not waited for."""
 _CLIMB_DOUBT_M = 1.0
-"""Below, the rotors' own wash moves the barometer, and the adapter holds rate and height apart."""
+"""Below, the rotors' own wash moves the barometer, and the adapter holds rate and height apart.  A climb that
+was found to be wrong is put right down to the floor."""
 _GAP_NS = 100_000_000
 """Frames further apart do not follow each other."""
 _WAIT_NS = 300_000_000
@@ -223,7 +224,7 @@ class StateEstimator:
         used, by_width_m = self.tracker.frame(lines, height_m, error_m), self.tracker.by_width_m
         if used and by_width_m is not None:
             carried.by_width(exposed_ns, by_width_m, climbed_m)
-        if measured_m < _CLIMB_DOUBT_M:
+        if measured_m < _CLIMB_DOUBT_M and not self.climb.found:
             self.climb.forget()
         elif used and by_width_m is not None and math.isfinite(measured_m + climbed_m):
             self.climb.step(exposed_ns, measured_m, by_width_m, climbed_m)

@@ -166,7 +166,7 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
             Trigger.CLOCK_UNSURE,
             Trigger.CAMERA_FROZEN,
             Trigger.FRAMES_STALE,
-            Trigger.LINES_LOST_LONG,
+            Trigger.NO_LINES,
         ),
         Phase.LAND,
     )

@@ -192,8 +192,9 @@ class HazardMonitor:
         elif lost and self._unseen_ns is None:
             self._unseen_ns = s.now_ns
         self.unseen_s = 0.0 if self._unseen_ns is None else (s.now_ns - self._unseen_ns) * 1e-9
-        too_long = self.unseen_s > p.lines_land_s or self.blind.too_long
-        if self._rises_unseeing(s) if situation.takes_off else lost and too_long:
+        if situation.takes_off and self._rises_unseeing(s):
+            return {Trigger.NO_LINES}
+        if lost and (self.unseen_s > p.lines_land_s or self.blind.too_long):
             return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}
         if lost:
             return {Trigger.LINES_LOST}

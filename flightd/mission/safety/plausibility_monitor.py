@@ -23,7 +23,7 @@ _OFF_M, _OFF_SHARE = 0.25, 0.12
 commanded has to stay within half a metre, whatever is flown at."""
 _BOTH_SHARE, _SCALE_SHARE = 0.085, 0.065
 """It is wrong, too, where width and scale are both off by more: lengths on the floor do not come out as the
-map and the motion have them.  A focal length alone errs by less (`SensorPriors.scale_share`); a creep that the
+map and the motion have them.  A focal length alone errs by less (`SensorPriors.scale_share`); a creep that
 swings of a stuck reading hide shows in both."""
 _KNOWN_M = 0.3
 """A position less certain than this (standard deviation) cannot tell whether the corridor is left."""
