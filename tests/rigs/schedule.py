@@ -81,13 +81,12 @@ def place_of(nodeid: str, *, slow: bool) -> int:
 
 
 def in_order(items: list[pytest.Item]) -> None:
-    """Sort them.  Of those by the clock come last what needs little of the machine: they are short."""
-    items.sort(
-        key=lambda item: (
-            -cores_of(item),
-            place_of(item.nodeid, slow=item.get_closest_marker("slow") is not None),
-        )
-    )
+    """Sort them.  Those by the clock are outermost, and of them what needs little of the machine comes last:
+    it is short."""
+    clocked = sorted(filter(cores_of, items), key=cores_of, reverse=True)
+    others = [item for item in items if not cores_of(item)]
+    others.sort(key=lambda item: place_of(item.nodeid, slow=item.get_closest_marker("slow") is not None))
+    items[:] = [*clocked[::2], *others, *reversed(clocked[1::2])]
 
 
 class FromBothEnds(LoadScopeScheduling):  # type: ignore[misc]  # its library has no types
