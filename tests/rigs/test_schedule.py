@@ -15,7 +15,8 @@ class Worker:
 
     shutting_down = False
 
-    def __init__(self) -> None:
+    def __init__(self, name: str) -> None:
+        self.gateway = SimpleNamespace(id=name)
         self.given: list[int] = []
 
     def send_runtest_some(self, indices: list[int]) -> None:
@@ -73,7 +74,7 @@ def test_those_by_the_clock_are_outermost_the_longest_first_from_both_ends() -> 
 
 def test_every_second_worker_takes_from_the_end() -> None:
     tests = [f"tests/unit/test_sums.py::{number}" for number in range(20)]
-    workers = [Worker(), Worker()]
+    workers = [Worker("gw0"), Worker("gw1")]
     option = SimpleNamespace(loadscopereorder=True)
     config: Any = SimpleNamespace(getvalue=lambda _name: ["popen"] * len(workers), option=option)
     schedule: Any = FromBothEnds(config, None)
