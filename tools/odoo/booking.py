@@ -64,12 +64,16 @@ def book(
 
 
 def _book(odoo: Odoo, booking: Booking, approval: Approval) -> tuple[int, ...]:
-    """The quants that were booked."""
+    """The quants that were booked.  RunError where Odoo's stock is not what the plan was made by: that is
+    asked after the quantity is set, and from then on Odoo itself looks after it."""
     quants, made = booking.quants, booking.made
     if not quants and made is not None:
         quants = (odoo.new_counted(made.location, made.product, made.lot, booking.counted),)
     else:
         odoo.set_counted(quants, booking.counted)
+    if odoo.differences(quants) != booking.counted - booking.books:
+        odoo.clear_counted(quants)
+        raise RunError("Odoo's stock has changed meanwhile, nothing was booked", remedy="make a new plan")
     if approval.applies:
         why = (
             f"flightd: counted {booking.utc:%Y-%m-%d %H:%M} UTC, run {booking.run}, approved by {approval.by}"

@@ -19,8 +19,8 @@ COLUMNS = ("place", "code", "quantity")
 
 
 def expected_csv(stock: OdooStock) -> bytes:
-    """A line for each label, one without code for each place where nothing may be.  InputError where a station
-    would not take so much."""
+    """A line for each label, one without code for each place where nothing may be.  InputError where that is
+    more than a station takes."""
     out = io.StringIO()
     writer = csv.writer(out, delimiter=";", lineterminator="\r\n")
     writer.writerow(COLUMNS)
@@ -31,7 +31,7 @@ def expected_csv(stock: OdooStock) -> bytes:
     data = out.getvalue().encode()
     if len(rows) > MOST_ROWS or len(data) > MOST_BYTES:
         raise InputError(
-            f"{len(rows)} rows, {len(data)} bytes: more than a station takes ({MOST_ROWS} rows, {MOST_BYTES})",
+            f"{len(rows)} rows, {len(data)} bytes; a station takes {MOST_ROWS} and {MOST_BYTES}",
             key="odoo.location",
             remedy="name a smaller part of the warehouse",
         )

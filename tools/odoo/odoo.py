@@ -8,7 +8,7 @@ Source: Odoo 19 documentation, External JSON-2 API.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias, TypeVar
 
 import msgspec
@@ -31,6 +31,10 @@ class Record(msgspec.Struct, frozen=True):
     """What every record has."""
 
     id: int
+
+
+class _Waiting(Record, frozen=True):
+    inventory_diff_quantity: float
 
 
 _R = TypeVar("_R", bound=Record)
@@ -96,7 +100,7 @@ class Odoo:
     def new_counted(self, location: int, product: int, lot: int, counted: float) -> int:
         """Change: as `set_counted`, where Odoo has no quant; the id of the one that it makes."""
         vals = {"product_id": product, "location_id": location, "lot_id": lot, "inventory_quantity": counted}
-        made = self._ask(
+        made: list[int] = self._ask(
             "stock.quant", "create", list[int], changes=True, context=_COUNTING, vals_list=[vals]
         )
         if len(made) != 1:
@@ -104,6 +108,22 @@ class Odoo:
                 f"Odoo made {len(made)} quants of one", remedy="look there, then run it again"
             )
         return made[0]
+
+    def differences(self, quants: Sequence[int]) -> float:
+        """Of the counted quantities from what Odoo had as they were set, all together."""
+        found = self.first("stock.quant", _Waiting, [["id", "in", list(quants)]], len(quants))
+        return sum(quant.inventory_diff_quantity for quant in found)
+
+    def clear_counted(self, quants: Sequence[int]) -> None:
+        """Change: no counted quantity waits any more."""
+        self._ask(
+            "stock.quant",
+            "action_clear_inventory_quantity",
+            Any,
+            changes=True,
+            ids=list(quants),
+            context=_COUNTING,
+        )
 
     def apply_counted(self, quants: Sequence[int], why: str) -> None:
         """Change: the stock becomes what was counted.  RunError where Odoo asks a person instead."""
@@ -126,31 +146,37 @@ class Odoo:
 _NEW_KEY = "make one in Odoo: Preferences, Account Security, New API Key (it ends after three months at most)"
 
 
-def _refused(url: str) -> Any:
+def _refused(url: str) -> Callable[[Refusal], FlightdError]:
     """What the statuses of the JSON-2 API mean for the person at the connector."""
 
     def refused(told: Refusal) -> FlightdError:
-        said = f": {told.said}" if told.said else ""
-        if told.status == 401:
-            return InputError(
-                f"Odoo does not take the key{said}", file=url, key="ODOO_API_KEY", remedy=_NEW_KEY
-            )
-        if told.status == 403:
-            remedy = "give the key's user the right to Inventory (to apply counts: Administrator)"
-            return InputError(f"Odoo forbids {told.way}{said}", file=url, key="ODOO_API_KEY", remedy=remedy)
-        if told.status == 404 and told.said:
-            remedy = "is the app Inventory installed, and odoo.database the right one?"
-            return InputError(f"Odoo does not know {told.way}{said}", file=url, remedy=remedy)
-        if told.status == 404:
-            remedy = "it needs Odoo 19 or later; correct odoo.url or odoo.database"
-            return InputError("there is no JSON-2 API", file=url, key="odoo.url", remedy=remedy)
-        if told.status < 400:
-            remedy = "give the address that it leads to, with https:// if that is it"
-            return InputError("the address leads elsewhere", file=url, key="odoo.url", remedy=remedy)
-        if told.status in {408, 429} or told.status >= 500:
-            what = f"Odoo cannot answer now (HTTP {told.status}){said}"
-            return UnavailableError(what, file=url, remedy="try again later; its log says more")
-        return RunError(f"Odoo refuses {told.way}{said or f': HTTP {told.status}'}", file=url,
-                        remedy="put that right in Odoo, then run the command again")  # fmt: skip
+        kind, what, key, remedy = _meant(told)
+        return kind(f"{what}: {told.said}" if told.said else what, file=url, key=key, remedy=remedy)
 
     return refused
+
+
+def _meant(told: Refusal) -> tuple[type[FlightdError], str, str, str]:
+    """The error, what is the matter, the key that it is about, and the remedy."""
+    match told.status:
+        case 401:
+            found = (InputError, "Odoo does not take the key", "ODOO_API_KEY", _NEW_KEY)
+        case 403:
+            remedy = "give the key's user the right to Inventory (to apply counts: Administrator)"
+            found = (InputError, f"Odoo forbids {told.way}", "ODOO_API_KEY", remedy)
+        case 404 if told.said:
+            remedy = "is the app Inventory installed, and odoo.database the right one?"
+            found = (InputError, f"Odoo does not know {told.way}", "", remedy)
+        case 404:
+            remedy = "it needs Odoo 19 or later; correct odoo.url or odoo.database"
+            found = (InputError, "there is no JSON-2 API", "odoo.url", remedy)
+        case status if status < 400:
+            remedy = "give the address that it leads to, with https:// if that is it"
+            found = (InputError, "the address leads elsewhere", "odoo.url", remedy)
+        case 408 | 429 | 500 | 502 | 503 | 504:
+            what = f"Odoo cannot answer now (HTTP {told.status})"
+            found = (UnavailableError, what, "", "try again later; its log says more")
+        case _:
+            remedy = "put that right in Odoo, then run the command again"
+            found = (RunError, f"Odoo refuses {told.way} (HTTP {told.status})", "", remedy)
+    return found

@@ -1,7 +1,7 @@
 """Odoo's stock against the count: what may be booked, and why the rest may not.
 
 A count is trusted where it is confirmed, sure and fresh, no person has the place in hand, and Odoo has moved
-nothing there since.  The last is what makes bookings safe to repeat: a booking is a move, too, so that no look
+nothing there since.  The last is what makes bookings safe to repeat: a booking is a move, too, and so no look
 is ever booked twice.
 """
 
@@ -81,7 +81,7 @@ class _Planning:
             raise InputError(
                 f"Odoo has none of the places that were counted, of which the first is {first}",
                 key="odoo.place",
-                remedy="give the locations these barcodes in Odoo, or choose another of barcode, name, complete_name",
+                remedy="give them to the locations in Odoo, or choose what of a location a place is",
             )
 
     def judged(self, line: Difference) -> Iterator[Booking | Untouched]:
@@ -149,8 +149,9 @@ class _Planning:
         asked = self.asked.counts
         if seen.utc is None or not seen.state.is_counted:
             return "the place was not counted"
-        if (seen.confidence or 0.0) < asked.least_confidence:
-            return f"it was counted with confidence {seen.confidence or 0.0:.2f}, less than {asked.least_confidence:g}"
+        sure = seen.confidence or 0.0
+        if sure < asked.least_confidence:
+            return f"it was counted with confidence {sure:.2f}, less than {asked.least_confidence:g}"
         if seen.utc > self.now + _CLOCKS:
             return "it was counted in the future: set the clocks right"
         if self.now - seen.utc > timedelta(hours=asked.oldest_h):

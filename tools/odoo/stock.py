@@ -158,16 +158,20 @@ def _places(odoo: Odoo, asked: OdooSection, root: int, left_out: list[str]) -> d
         if not isinstance(place, str) or not place.strip():
             nameless += 1
         elif place in places:
+            both = f"{places[place].complete_name} and {location.complete_name}"
             raise InputError(
-                f"{places[place].complete_name} and {location.complete_name} have both the {asked.place} {place!r}",
+                f"{both} have the same {asked.place} {place!r}",
                 key="odoo.place",
                 remedy="give each location its own in Odoo, or choose complete_name",
             )
         else:
             places[place] = location
     if not places:
-        raise InputError(f"no internal location below {asked.location} has a {asked.place}", key="odoo.place",
-                         remedy="set them in Odoo, or choose another of barcode, name, complete_name")  # fmt: skip
+        raise InputError(
+            f"no internal location below {asked.location} has a {asked.place}",
+            key="odoo.place",
+            remedy="set them in Odoo, or choose another of barcode, name, complete_name",
+        )
     if nameless:
         left_out.append(f"{nameless} locations without a {asked.place}")
     return places
