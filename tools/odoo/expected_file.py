@@ -24,8 +24,8 @@ def expected_csv(stock: OdooStock) -> bytes:
     out = io.StringIO()
     writer = csv.writer(out, delimiter=";", lineterminator="\r\n")
     writer.writerow(COLUMNS)
-    rows = [(one.place, one.code, _number(one.quantity)) for one in stock.lying if one.place in stock.places]
-    filled = {place for place, _, _ in rows}
+    rows = [(one.place, one.code, _number(one.quantity)) for one in stock.lying]
+    filled = {place for place, _, _ in rows} | stock.untold
     rows += [(place, "", "") for place in stock.places if place not in filled]
     writer.writerows([inert(cell) for cell in row] for row in sorted(rows))
     data = out.getvalue().encode()

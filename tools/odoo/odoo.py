@@ -158,6 +158,7 @@ def _refused(url: str) -> Callable[[Refusal], FlightdError]:
 
 def _meant(told: Refusal) -> tuple[type[FlightdError], str, str, str]:
     """The error, what is the matter, the key that it is about, and the remedy."""
+    found: tuple[type[FlightdError], str, str, str]
     match told.status:
         case 401:
             found = (InputError, "Odoo does not take the key", "ODOO_API_KEY", _NEW_KEY)

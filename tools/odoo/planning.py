@@ -115,6 +115,8 @@ class _Planning:
         location = self._locations.get(place.casefold())
         if location is None:
             return Untouched(place, code, f"Odoo has no location with the {self.asked.odoo.place} {place}")
+        if any(place.casefold() == one.casefold() for one in self.stock.untold):
+            return Untouched(place, code, "Odoo has something there that no label names: give that a barcode")
         reason = self._doubt_about(place)
         if reason:
             return Untouched(place, code, f"not expected there, but {reason}")

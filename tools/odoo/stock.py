@@ -63,16 +63,18 @@ class OdooStock:
     places: Mapping[str, Location]
     lying: tuple[Lying, ...]
     left_out: tuple[str, ...]
+    untold: frozenset[str]
+    """The places of what is left out: that nothing else may be there is not known of them."""
     aliases: Mapping[str, str]
     """The codes of labels by what else may be printed there: the key of a lot's bare name."""
 
     @property
     def expected(self) -> dict[str, list[str]]:
         """The codes of every place; an empty place has none."""
-        found: dict[str, list[str]] = {place: [] for place in self.places}
+        found: dict[str, list[str]] = {place: [] for place in self.places if place not in self.untold}
         for one in self.lying:
             if any(quant.quantity > 0 for quant in one.quants):
-                found[one.place].append(one.code)
+                found.setdefault(one.place, []).append(one.code)
         return found
 
 
@@ -90,9 +92,12 @@ def read_stock(odoo: Odoo, asked: OdooSection) -> OdooStock:
     products = _products(odoo, quants)
     found: dict[tuple[str, str], list[Quant]] = {}
     named_so: dict[str, set[str]] = {}
+    untold: set[str] = set()
     for quant in quants:
         place = named[quant.location_id[0]]
         code = label_of(quant, products[quant.product_id[0]], asked.labels)
+        if not code or quant.quantity < 0:
+            untold.add(place)
         if not code:
             left_out.append(
                 f"{quant.product_id[1]} at {place}: no label names it; give the product a barcode"
@@ -105,7 +110,7 @@ def read_stock(odoo: Odoo, asked: OdooSection) -> OdooStock:
                 named_so.setdefault(code_key(quant.lot_id[1]), set()).add(code)
     lying = tuple(Lying(place, code, tuple(there)) for (place, code), there in found.items())
     aliases = {key: codes.pop() for key, codes in named_so.items() if len(codes) == 1}
-    return OdooStock(places, lying, tuple(left_out), aliases)
+    return OdooStock(places, lying, tuple(left_out), frozenset(untold), aliases)
 
 
 def label_of(quant: Quant, product: Product, labels: Iterable[Naming]) -> str:
