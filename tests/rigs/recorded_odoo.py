@@ -23,7 +23,7 @@ _CHANGES = ("write", "create", "action_apply_inventory", "action_clear_inventory
 
 @dataclass(frozen=True)
 class Answer:
-    """`body` as JSON, or as it is where it is text.  `cut`: the connection ends amid it; `silent`: none comes."""
+    """`body` as JSON, or as it is where it is text.  `cut`: it ends half-way; `silent`: none comes."""
 
     status: int = 200
     body: Any = None
@@ -33,7 +33,8 @@ class Answer:
 
 
 class RecordedOdoo:
-    """`asked` has every question by model and method; `instead` answers those of a method otherwise."""
+    """`asked` has every question by model and method; `instead` answers those of a method
+    otherwise, or of a method and the last field that is asked for, `METHOD:FIELD`."""
 
     def __init__(self) -> None:
         told = json.loads(RECORDED.read_text(encoding="utf-8"))
@@ -73,8 +74,9 @@ class RecordedOdoo:
             return self.refusal("no JSON-2 API")
         asked, given = path.removeprefix("/json/2/"), json.loads(body)
         self.asked.append((asked, given))
-        if asked in self.instead:
-            return self.instead[asked]
+        last = f"{asked}:{given.get('fields', [''])[-1]}"
+        if last in self.instead or asked in self.instead:
+            return self.instead.get(last) or self.instead[asked]
         known = [pair for pair in self._pairs if (pair["ask"], pair["given"]) == (asked, given)]
         known = [pair for pair in known if self._scenes.index(pair["from"]) <= self._scene]
         if not known:

@@ -1,12 +1,12 @@
-"""An Odoo and a ground station are connected: stock in, count, bookings out, each of them once and by a person."""
+"""An Odoo and a ground station are connected: stock in, count, bookings out, once and by a person."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import json
-from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass, replace
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from flightd.ground.access.passwords import hashed_secret, new_key
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
 from flightd.ground.ground_store.feeder import Feeder
 from flightd.ground.ground_store.open_store import opened_store
+from flightd.ground.server import Listening
 from flightd.ground.wms_exchange.exchange import Exchange
 from flightd.ground.wms_exchange.exchange_file import load_exchange
 from tests.rigs.event_loops import in_real_time
@@ -66,6 +67,7 @@ class Connector:
     odoo: RecordedOdoo
     station: Station
     capsys: pytest.CaptureFixture[str]
+    feeder: Feeder | None = None
     said: str = ""
     timeout_s: float = 20.0
 
@@ -106,10 +108,11 @@ async def connected(
     monkeypatch.setenv("ODOO_API_KEY", KEY)
     monkeypatch.setenv("FLIGHTD_STORE_KEY", secret)
     with opened_store(str(here / "store.db")) as store:
-        Feeder(store, hall, (), state).feed()
+        feeder = Feeder(store, hall, (), state)
+        feeder.feed()
         nobody = ("demo", Address("127.0.0.1", 1, 1))
         async with served(nobody, folder=hall, state=state, store=store) as station:
-            yield Connector(here, odoo, station, capsys)
+            yield Connector(here, odoo, station, capsys, feeder)
 
 
 async def compared(connector: Connector) -> dict[tuple[str, str], str]:
@@ -132,7 +135,7 @@ async def test_stock_comes_in_and_what_a_person_approves_is_booked_once(
         assert await connector("expected") == 0, connector.said
         assert connector.lines == [
             "odoo-stock.csv: 6 labels at 10 places",
-            "left out: 1 locations without a barcode",
+            "left out: locations without a barcode: 1",
             "left out: Wire at AL-04-1-1: no label names it; give the product a barcode",
         ]
         shown = await compared(connector)
@@ -147,9 +150,9 @@ async def test_stock_comes_in_and_what_a_person_approves_is_booked_once(
             "BL-01-1-2 010401120029690821SN-77: 0 -> 1 (unexpected)",
             "AL-02-2-1 PAL-8/L1: not booked: lies at AL-03-2-1: move it in Odoo",
             "AL-04-2-1 <b>PAL-10</b>: not booked: Odoo has the package at WH/Output: move it in Odoo",
-            "BL-01-1-1 =1+2: not booked: Odoo knows no lot or serial number =1+2: make it in Odoo, or correct "
-            "the label",
-            "3 labels agree, 2 may be booked, 3 need a look, 1 were not counted",
+            "BL-01-1-1 =1+2: not booked: Odoo knows no lot or serial number =1+2: make it in Odoo, or "
+            "correct the label",
+            "3 labels agree, 2 may be booked, 3 need a look, not counted: 1",
         ]
         assert odoo.changes == []
 
@@ -175,3 +178,156 @@ async def test_stock_comes_in_and_what_a_person_approves_is_booked_once(
         ]  # fmt: skip
         assert await connector("expected") == 0
         assert ("AL-02-1-1", "PAL-3") not in await compared(connector)
+
+
+def _of(odoo: RecordedOdoo, **changed: Any) -> Answer:
+    """The quants, PAL-3 with other values."""
+    quants = odoo.recorded("stock.quant/search_read")
+    return Answer(200, [{**quant, **(changed if quant["id"] == 103 else {})} for quant in quants])
+
+
+@in_real_time
+async def test_a_count_that_is_not_trusted_is_told_and_not_booked(
+    tmp_path: Path, odoo: RecordedOdoo, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    moved = Answer(200, [{"id": 7, "date": "2023-11-14 22:40:00"}])
+    async with connected(tmp_path, odoo, monkeypatch, capsys) as connector:
+
+        async def why(method: str = "", answer: Answer | None = None, **given: Any) -> str:
+            odoo.instead = {} if answer is None else {method: answer}
+            assert await connector("plan", **given) == 0, connector.said
+            return next(line for line in connector.lines if line.startswith("AL-02-1-1 PAL-3: "))
+
+        assert "-> 0" in await why()
+        assert "Odoo moved something there since (2023-11-14 22:40:00 UTC)" in await why(
+            "stock.move.line/search_read", moved
+        )
+        stock = "stock.quant/search_read"
+        assert "a transfer in Odoo has reserved it" in await why(stock, _of(odoo, reserved_quantity=2.0))
+        waiting = {"inventory_quantity": 4.0, "inventory_quantity_set": True}
+        assert "a count of 4 waits in Odoo already" in await why(stock, _of(odoo, **waiting))
+        assert "the place is empty" in await why(counts='zeroed = ["wrong"]\n')
+        assert "confidence 0.98, less than 0.99" in await why(counts="least_confidence = 0.99\n")
+        assert "more than 24 h ago" in await why(after_h=25)
+        assert "in the future" in await why(after_h=-1)
+        decision = Decision("decision-1", "AL-02-1-1", 6, _COUNTED_NS, Decided.LOOKING, "ann")
+        DecisionBook(tmp_path / "hall").add("monday", decision)
+        assert connector.feeder is not None
+        connector.feeder.feed()
+        assert "ann has decided about it: looking" in await why()
+        assert odoo.changes == []
+
+
+@in_real_time
+async def test_nothing_is_booked_of_stock_that_changed_and_what_was_cut_is_finished(
+    tmp_path: Path, odoo: RecordedOdoo, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    apply, approve = "stock.quant/action_apply_inventory", ("--by", "ann", "--place", "AL-02-1-1")
+    async with connected(tmp_path, odoo, monkeypatch, capsys) as connector:
+        await connector("plan")
+        odoo.instead = {"stock.quant/search_read": _of(odoo, quantity=6.0)}
+        assert await connector("apply", *approve) == 1
+        assert odoo.changes == []
+        odoo.instead = {
+            "stock.quant/action_clear_inventory_quantity": Answer(200, None),
+            "stock.quant/write": Answer(200, True),
+            "stock.quant/search_read:inventory_diff_quantity": Answer(
+                200, [{"id": 103, "inventory_diff_quantity": -6.0}]
+            ),
+        }
+        assert await connector("apply", *approve) == 1
+        assert "Odoo's stock has changed meanwhile, nothing was booked" in connector.said
+        assert [asked for asked, _ in odoo.changes] == list(odoo.instead)[1::-1]
+        odoo.asked.clear()
+
+        odoo.instead = {apply: odoo.refusal("a proxy without its server")}
+        assert await connector("apply", *approve) == 2
+        assert "Odoo cannot answer now (HTTP 502)" in connector.lines[-1]
+        conflict = {"name": "Conflict in Inventory Adjustment", "type": "ir.actions.act_window"}
+        odoo.instead = {apply: Answer(200, conflict)}
+        assert await connector("apply", *approve) == 1
+        assert "but asks: Conflict in Inventory Adjustment" in connector.said
+        odoo.instead = {}
+        assert await connector("apply", "--set-only", *approve) == 0
+        assert connector.lines == ["AL-02-1-1 PAL-3 5 -> 0: set: apply it in Odoo under Physical Inventory"]
+        assert await connector("apply", *approve) == 0
+        assert connector.lines == ["AL-02-1-1 PAL-3 5 -> 0: applied"]
+
+
+@in_real_time
+async def test_a_bad_answer_is_one_line_with_what_to_do(
+    tmp_path: Path, odoo: RecordedOdoo, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = "stock.location/search_read"
+    half = Answer(200, [{"id": 8, "name": "Stock"}])
+    refusals = {
+        "a user who may not": "Odoo forbids /json/2/stock.location/search_read: You are not allowed to "
+        "access 'Quants' (stock.quant) records.",
+        "a model that Odoo does not know": "the model 'stock.location' does not exist; is the app Inventory",
+        "a rule against it": "(HTTP 422): Quant's editing is restricted",
+        "a fault of its own": "could not serialize access due to concurrent update; try again later",
+        "no JSON-2 API": "there is no JSON-2 API; it needs Odoo 19 or later",
+        "a page of the proxy": "with a web page that is no JSON; is that its own address",
+        "a proxy without its server": "Odoo cannot answer now (HTTP 502); try again later",
+        "another address": "the address leads elsewhere; give the address",
+    }
+    answers = {name: (odoo.refusal(name), said) for name, said in refusals.items()} | {
+        "half a record": (half, "otherwise than it is documented: Object missing required field"),
+        "half an answer": (Answer(200, [{"id": 8}] * 50, cut=True), "the answer of Odoo broke off; try"),
+        "no location": (Answer(200, []), "odoo.location: Odoo has no location 'WH/Stock'"),
+        "no barcodes": (
+            Answer(200, [{"id": 8, "name": "Stock", "complete_name": "WH/Stock", "barcode": False}]),
+            "odoo.place: no internal location below WH/Stock has a barcode",
+        ),
+        "no answer": (Answer(silent=True), "Odoo did not answer within 0.3 s; try again later"),
+    }  # fmt: skip
+    connector = Connector(tmp_path, odoo, Station(Listening("127.0.0.1", 1)), capsys)
+    monkeypatch.setenv("FLIGHTD_STORE_KEY", "flightd_any")
+
+    async def refused(*step: str) -> str:
+        assert await connector(*step) in {1, 2}
+        (line,) = connector.lines
+        assert line.startswith("odoo: "), line
+        return line
+
+    monkeypatch.delenv("ODOO_API_KEY", raising=False)
+    assert "ODOO_API_KEY: Odoo asks for a key; make one in Odoo" in await refused("plan")
+    monkeypatch.setenv("ODOO_API_KEY", "wrong")
+    assert "ODOO_API_KEY: Odoo does not take the key: Invalid apikey; make one" in await refused("plan")
+    monkeypatch.setenv("ODOO_API_KEY", KEY)
+    for name, (answer, said) in answers.items():
+        odoo.instead = {asked: answer}
+        connector.timeout_s = 0.3 if answer.silent else 20.0
+        assert said in await refused("expected"), (name, connector.said)
+    odoo.instead = {}
+    assert "the station cannot be had: Connection refused; try again later" in await refused("plan")
+    odoo.url = "http://127.0.0.1:1"
+    assert "Odoo cannot be had: Connection refused; try again later" in await refused("expected")
+    odoo.url = "http://odoo.example"
+    assert "odoo.url: the key would be read on the way; give https://" in await refused("expected")
+
+
+@in_real_time
+async def test_what_the_station_refuses_and_a_plan_of_another_kind_are_one_line(
+    tmp_path: Path, odoo: RecordedOdoo, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    async with connected(tmp_path, odoo, monkeypatch, capsys) as connector:
+        assert await connector("apply", "--by", "ann") == 2
+        assert "plan.json: No such file or directory; make one: python -m tools.odoo plan" in connector.said
+        (tmp_path / "plan.json").write_text('{"site": "hall"}')
+        assert await connector("apply", "--by", "ann") == 2
+        assert "plan.json: not a plan: Object missing required field `bookings`" in connector.said
+        await connector("plan")
+        assert await connector("apply", "--by", " ") == 2
+        assert "--by: a person approves what is booked" in connector.said
+        assert await connector("apply", "--by", "ann", "--place", "AL-09-9-9") == 2
+        assert "--place: the plan books nothing at AL-09-9-9" in connector.said
+        assert await connector("plan", counts="colour = 1\n") == 2
+        assert "counts.colour: " in connector.said
+        monkeypatch.setenv("FLIGHTD_STORE_KEY", "flightd_of_nobody")
+        assert await connector("plan") == 2
+        assert (
+            "FLIGHTD_STORE_KEY: the station answers: this key is nobody's here; set it to one of"
+            in connector.said
+        )
+        assert odoo.changes == []

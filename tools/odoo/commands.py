@@ -134,7 +134,7 @@ def _plan_lines(plan: Plan) -> list[str]:
     )
     lines = [f"{one.place} {one.code}: {one.books:g} -> {one.counted:g} ({one.why})" for one in plan.bookings]
     lines += [f"{one.place} {one.code}: not booked: {one.why}" for one in plan.untouched]
-    return [*lines, f"{total}, {plan.uncounted} were not counted"]
+    return [*lines, f"{total}, not counted: {plan.uncounted}"]
 
 
 def _what(one: Booked) -> str:

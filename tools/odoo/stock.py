@@ -178,7 +178,7 @@ def _places(odoo: Odoo, asked: OdooSection, root: int, left_out: list[str]) -> d
             remedy="set them in Odoo, or choose another of barcode, name, complete_name",
         )
     if nameless:
-        left_out.append(f"{nameless} locations without a {asked.place}")
+        left_out.append(f"locations without a {asked.place}: {nameless}")
     return places
 
 
