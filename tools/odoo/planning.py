@@ -169,8 +169,8 @@ class _Planning:
     def _moved(self, seen: Counted) -> str:
         assert seen.utc is not None
         location = self._locations[seen.location.casefold()]
-        # Odoo has times to the second: what moved within the second of the look counts as later
-        since = seen.utc.replace(microsecond=0, tzinfo=None).isoformat(sep=" ")
+        # the clocks of both differ: what moved a little before the look counts as later
+        since = (seen.utc - _CLOCKS).replace(microsecond=0, tzinfo=None).isoformat(sep=" ")
         here = ["|", ["location_id", "=", location.id], ["location_dest_id", "=", location.id]]
         moves = self.odoo.first(
             "stock.move.line", _Moved, [["state", "=", "done"], ["date", ">=", since], *here], 1
