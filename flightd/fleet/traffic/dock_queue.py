@@ -1,12 +1,13 @@
 """Drones on their way to docks, on them, and in the queue before them.
 
 Whoever has nothing left to count and too little charge for a tour wants a dock.  It flies there once the
-dock that is best for it is free; until then it goes on to its own pad and waits there, where it is in nobody's
-way.  A dock has one drone at a time, from when it is chosen until that drone has left it.
+dock that is best for it is free; until then it goes on to its own pad and waits there, in nobody's way.  A
+dock has one drone at a time, from when it is chosen until that drone has left it.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -24,6 +25,7 @@ _CONTACT_MS: Final = 15_000
 _RETRY_MS: Final = 15_000
 _LEAVES_MS: Final = 40_000
 """Until a dock is free of a drone that is done."""
+_TOLD_KEPT: Final = 200
 _HOVERS_MS: Final = 1_000
 """Over a dock before it lands anew."""
 
@@ -53,7 +55,10 @@ class DockQueue:
         self._shunned: dict[str, set[str]] = {}
         self._next_try_ms: dict[str, int] = {}
         self.waited_ms = 0
-        self.told: list[str] = []
+        self._stranded: set[str] = set()
+        self.told: deque[str] = deque(maxlen=_TOLD_KEPT)
+        """The newest lines for people; `told_count` counts all."""
+        self.told_count = 0
 
     @property
     def are_there(self) -> bool:
@@ -81,6 +86,10 @@ class DockQueue:
         if waiting:
             self._send(waiting, known, now_ms)
 
+    def _tell(self, line: str) -> None:
+        self.told.append(line)
+        self.told_count += 1
+
     def _dock_of(self, drone: str) -> Dock | None:
         return next((self._docks[name] for name, holder in self._holder.items() if holder == drone), None)
 
@@ -107,16 +116,14 @@ class DockQueue:
         landings = self._landings[drone] = self._landings.get(drone, 0) + 1
         self._next_try_ms[drone] = now_ms + _RETRY_MS
         if landings < LANDINGS:
-            self.told.append(f"{drone} has no contact on dock {dock.name}: it lands anew")
+            self._tell(f"{drone} has no contact on dock {dock.name}: it lands anew")
             vertex = self._control.lanes.vertices[dock.place]
             over = Stop(
                 self._control.lanes.over(vertex.node), self._control.lanes.column_of[vertex.node], _HOVERS_MS
             )
             self._give(drone, (over,), dock, now_ms)
             return
-        self.told.append(
-            f"{drone} has no contact on dock {dock.name} after {landings} landings: it takes another"
-        )
+        self._tell(f"{drone} has no contact on dock {dock.name} after {landings} landings: it takes another")
         self._landings.pop(drone)
         self._shunned.setdefault(drone, set()).add(dock.name)
         self._go_home(drone, now_ms)
@@ -138,6 +145,9 @@ class DockQueue:
             others = {name: way_ms for name, way_ms in near.items() if name not in shunned}
             if not others:
                 self._shunned.pop(drone, None)  # all in reach: once more from the first
+            if not near and not course.ahead and drone not in self._stranded:
+                self._stranded.add(drone)
+                self._tell(f"{drone} reaches no dock any more with what is left of its battery")
             found.append(Waiting(drone, standing.charge, others or near))
         return sorted(found, key=lambda each: (self._since_ms[each.drone], each.drone))
 

@@ -46,8 +46,8 @@ _HUB_STEPS: Final = 2
 class FleetScenario:
     """What is flown.  `failing` drones fail between shelves after they counted for a time within `fails_s`,
     each after a while of its own; one aisle is closed from `closed_from` to `closed_to`, shares of the
-    hours.  Where there are docks, `swaps` of them swap a battery in `swap_s`, and `contacts` charge it; a share
-    `misaligned` of the landings on these finds no contact."""
+    hours.  Of the docks, if there are any, `swaps` swap a battery in `swap_s`, and `contacts` charge it; a
+    share `misaligned` of the landings on these finds no contact."""
 
     drones: int = 10
     aisles: int = 40
@@ -264,6 +264,7 @@ class FleetSimulation:
                 for dock in self.docks
             ],
             "waited_for_docks_s": round(self.dispatcher.docks.waited_ms / 1000, 1),
+            "docks_told_count": self.dispatcher.docks.told_count,
             "docks_told": list(self.dispatcher.docks.told),
         }
 
