@@ -307,7 +307,7 @@ class Dispatcher:
     def _left_ms(self, drone: str) -> int:
         """In the air, down to the reserve and the way to a dock."""
         keep_ms = self.docks.keep_ms(drone)
-        spare_ms = int(_SLOWER * keep_ms) + _SPARE_MS if keep_ms else 0
+        spare_ms = int(_SLOWER * (1 + _SPARE_FRAC) * keep_ms) + _SPARE_MS if keep_ms else 0
         return self._endurance.left_ms(self._charge.get(drone, 1.0)) - spare_ms
 
     def _fill_batteries(self, now_ms: int) -> None:
@@ -324,7 +324,8 @@ class Dispatcher:
                 and drone not in self._held
             ):
                 known[drone] = Standing(self._charge[drone], self._charging[drone])
-                left_ms[drone] = int((self._endurance.left_ms(self._charge[drone]) - _SPARE_MS) / _SLOWER)
+                spared_ms = self._endurance.left_ms(self._charge[drone]) - _SPARE_MS
+                left_ms[drone] = int(spared_ms / (_SLOWER * (1 + _SPARE_FRAC)))
         self.docks.step(now_ms, known, left_ms)
 
     def _replanned(self, drones: Sequence[str], now_ms: int) -> None:

@@ -84,7 +84,7 @@ class DockQueue:
             self._watch_contact(drone, standing, now_ms)
         waiting = self._waiting(known, left_ms, now_ms)
         if waiting:
-            self._send(waiting, known, now_ms)
+            self._send(waiting, known, left_ms, now_ms)
 
     def _tell(self, line: str) -> None:
         self.told.append(line)
@@ -131,6 +131,7 @@ class DockQueue:
     def _waiting(self, known: dict[str, Standing], left_ms: dict[str, int], now_ms: int) -> list[Waiting]:
         """Those that want a dock, who waited longest first."""
         found: list[Waiting] = []
+        shut = frozenset().union(*map(self._control.avoided, self._control.drones))
         for drone, standing in known.items():
             course = self._control.drones[drone]
             wants = not course.stops and standing.charge < self._full_enough and self._dock_of(drone) is None
@@ -139,19 +140,23 @@ class DockQueue:
                 continue
             self._since_ms.setdefault(drone, now_ms)
             at = course.base[-1].vertex if course.base else course.place
-            ways = {dock.name: self._way_ms(at, dock) for dock in self._docks.values()}
+            ways = {
+                dock.name: self._way_ms(at, dock) for dock in self._docks.values() if dock.place not in shut
+            }
             near = {name: way_ms for name, way_ms in ways.items() if way_ms <= left_ms[drone]}
             shunned = self._shunned.get(drone, set())
             others = {name: way_ms for name, way_ms in near.items() if name not in shunned}
             if not others:
                 self._shunned.pop(drone, None)  # all in reach: once more from the first
-            if not near and not course.ahead and drone not in self._stranded:
+            if ways and not near and not course.ahead and drone not in self._stranded:
                 self._stranded.add(drone)
                 self._tell(f"{drone} reaches no dock any more with what is left of its battery")
             found.append(Waiting(drone, standing.charge, others or near))
         return sorted(found, key=lambda each: (self._since_ms[each.drone], each.drone))
 
-    def _send(self, waiting: Sequence[Waiting], known: dict[str, Standing], now_ms: int) -> None:
+    def _send(
+        self, waiting: Sequence[Waiting], known: dict[str, Standing], left_ms: dict[str, int], now_ms: int
+    ) -> None:
         free_ms = {name: self._free_in_ms(name, known) for name in self._docks}
         for drone, dock in chosen_docks(self._docks.values(), free_ms, waiting).items():
             holder = self._holder.get(dock.name)
@@ -159,9 +164,18 @@ class DockQueue:
                 self._make_room(holder, dock, known, now_ms)
             elif not self._is_early(drone, now_ms):
                 self._next_try_ms[drone] = now_ms + _RETRY_MS
-                if self._give(drone, (), dock, now_ms):
+                if self._fly_to(drone, dock, left_ms[drone], now_ms):
                     self._holder[dock.name] = drone
                     self.waited_ms += now_ms - self._since_ms.pop(drone)
+
+    def _fly_to(self, drone: str, dock: Dock, left_ms: int, now_ms: int) -> bool:
+        """To a dock, if its battery lasts for that with all that it has to wait for; home otherwise."""
+        if not self._give(drone, (), dock, now_ms):
+            return False
+        if self._control.drones[drone].ahead[-1].end_ms - now_ms <= left_ms:
+            return True
+        self._go_home(drone, now_ms)
+        return False
 
     def _make_room(self, holder: str, dock: Dock, known: dict[str, Standing], now_ms: int) -> None:
         """Who is charged, and has nothing to do, goes home for whoever waits."""

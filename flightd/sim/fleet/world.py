@@ -139,7 +139,8 @@ class FleetWorld:
         self._locate(drone)
 
     def _stand(self, drone: FleetDrone, dt_s: float) -> None:
-        """On a pad."""
+        """On a pad, which it sees: nobody there is in doubt where it is."""
+        drone.doubt_s = drone.doubt_m = 0.0
         dock = self._docks.get(drone.place)
         if dock is None:
             drone.charging = not self._docks
