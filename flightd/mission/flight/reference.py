@@ -11,7 +11,7 @@ from flightd.control.motion_profile import Profile
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Demand, LandedState, Phase
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.flight.touchdown import ReckonedHeight, Standstill, Touchdown
+from flightd.mission.flight.touchdown import ReckonedHeight, Standstill, Touchdown, UnheardDescent
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import Stop
@@ -76,6 +76,7 @@ class ReferenceGenerator:
         self._reckoned = ReckonedHeight()
         self._touchdown = Touchdown(p, self._reckoned)
         self._standstill = Standstill(p)
+        self._unheard = UnheardDescent(p)
         self._still_s = 0.0
         self._sinks = False
         self._by_itself = False
@@ -142,7 +143,8 @@ class ReferenceGenerator:
         else:
             climb = self._climb_mps(s, task)
         guide = Guide.STEER if self._steers else Guide.BRAKE if self._may_brake(s, task) else Guide.LEVEL
-        if task.phase is Phase.LAND and self._standstill.touches:
+        stands = self._unheard.step(s, -climb) or self._standstill.touches
+        if task.phase is Phase.LAND and stands:
             guide = Guide.LEVEL
         dead_reckoned = s.sight_s < self._hazards.expert.brake_s
         return Guidance(task.phase, guide, self._reference(climb), demand, dead_reckoned, task.state.stopped)

@@ -27,6 +27,8 @@ _FLOOR_M = 0.5
 """No range finder reads more on the floor."""
 _RECKONED_M, _RECKONED_SHARE = 0.3, 0.2
 """By how much a dead-reckoned height may be wrong, and by what share of the way."""
+_UNHEARD_M = 0.25
+"""By how much further than to the floor one sinks that is not heard before it is taken to stand."""
 _NEAR_FLOOR_M = 0.08
 _HIGH_S = 2.0
 _STILL_MPS = 0.1
@@ -187,6 +189,23 @@ class ReckonedHeight:
         """NaN where nothing tells."""
         doubt_m = 0.0 if self._moved_m is None else _RECKONED_M + _RECKONED_SHARE * self._moved_m
         return self._height_m - doubt_m
+
+
+class UnheardDescent:
+    """How far a vehicle that is not heard was commanded to sink since it told its height last: it stands by
+    then, and what lines seen from the floor say of its motion is nothing to lean by."""
+
+    def __init__(self, params: MissionConfig) -> None:
+        self._hold_s = params.telemetry_hold_s
+        self._left_m = math.inf
+
+    def step(self, s: MissionInputs, sink_mps: float) -> bool:
+        """Whether it should stand, after sinking at that rate for this tick."""
+        if s.telemetry_age_s > self._hold_s:
+            self._left_m -= sink_mps * s.dt_s
+        else:
+            self._left_m = s.believed_height_m if math.isfinite(s.believed_height_m) else math.inf
+        return self._left_m < -_UNHEARD_M
 
 
 class Touchdown:

@@ -10,7 +10,7 @@ import pytest
 
 from flightd.config.mission import MissionConfig
 from flightd.core.types import Attitude, AttitudeSetpoint, LandedState, VehicleState
-from flightd.mission.flight.touchdown import ReckonedHeight, Standstill
+from flightd.mission.flight.touchdown import ReckonedHeight, Standstill, UnheardDescent
 from flightd.mission.guidance import MissionInputs, Warnings
 
 TICK_NS = 20_000_000
@@ -164,3 +164,15 @@ def test_one_that_sinks_slowly_without_a_height_flies() -> None:
     for tick in range(30, 130):
         stands.step(told(tick, math.nan, -0.2), sinks=True)
     assert not stands.touches
+
+
+@pytest.mark.parametrize(("sinks_s", "stands"), [(3.0, False), (5.5, True)])
+def test_one_that_is_not_heard_stands_once_it_must_have_sunk_to_the_floor(
+    sinks_s: float, stands: bool
+) -> None:
+    unheard = UnheardDescent(PARAMS)
+    assert not unheard.step(told(0, 1.5, 0.0), 0.0)
+    silent = replace(told(1, math.nan, 0.0), telemetry_age_s=3.0)
+    steps = [unheard.step(silent, 0.35) for _ in range(round(sinks_s / 0.02))]
+    assert steps[-1] is stands
+    assert not unheard.step(told(2, 0.9, 0.0), 0.35), "it is heard again"
