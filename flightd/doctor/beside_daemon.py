@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
+from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding
 from flightd.config.schema import Config
 from flightd.core.exposure import ExposureState
 from flightd.core.types import VehicleState

@@ -11,7 +11,7 @@ from typing import Any
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
-from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
+from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding
 from flightd.config.schema import Config
 from flightd.doctor import camera, machine, vehicle
 from flightd.doctor.calibration import check_calibration, check_learnt

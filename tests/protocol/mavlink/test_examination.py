@@ -14,7 +14,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.examination import Examination
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
-from flightd.adapters.vehicle.mavlink.required_parameters import RULES, judge
+from flightd.adapters.vehicle.mavlink.parameter_rule import judge
+from flightd.adapters.vehicle.mavlink.required_parameters import RULES
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import too_slow
 from flightd.core.errors import UnavailableError
 from flightd.ports import Clock

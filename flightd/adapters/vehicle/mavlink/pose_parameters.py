@@ -1,0 +1,82 @@
+"""The parameters by which an autopilot's estimator takes our motion, or does not: data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.parameter_rule import Rule, one_of, within
+from flightd.config.vehicle import PoseChoice
+
+_PLACE, _HEIGHT, _SPEED, _HEADING = 1, 2, 4, 8
+"""Bits of EKF2_EV_CTRL."""
+_TAKEN = "by the motion that it is told (vehicle.pose_output) its attitude stays level; by itself it drifts"
+_UNHEARD = "else the motion that it is told (vehicle.pose_output) is not heard"
+_OWN_HEADING = "its heading must be its own: by ours it would leap where poses begin, end or are corrected"
+
+_ARDUPILOT_SPEED = Rule(("EK3_SRC1_VELXY",), one_of(6), "6 (external)", _TAKEN, 6)
+_ARDUPILOT = (
+    Rule(("VISO_TYPE",), one_of(1, 3), "1 (MAVLink) or 3 (VOXL)", _UNHEARD, 1),
+    Rule(("EK3_SRC1_POSXY",), one_of(6), "6 (external)", _TAKEN, 6),
+    _ARDUPILOT_SPEED,
+    Rule(("EK3_SRC1_YAW",), one_of(0, 1), "1 (compass) or 0 (gyro)", _OWN_HEADING, 1),
+    Rule(
+        ("VISO_DELAY_MS",),
+        within(40, 200),
+        "40 to 200 ms, from the exposure until its pose arrives",
+        "it reckons so for the fastest pose, whatever time that carries",
+        80,
+        optional=True,
+    ),
+)
+_ARDUPILOT_NONE = Rule(
+    ("VISO_TYPE",),
+    one_of(0),
+    "0 (none)",
+    "it is not armed as long as no poses come, and none are sent (vehicle.pose_output)",
+    0,
+    optional=True,
+)
+_PX4_TIMES = (
+    Rule(
+        ("EKF2_EV_DELAY",),
+        within(0, 20),
+        "0 ms",
+        "poses carry the time of their exposure",
+        0,
+        optional=True,
+    ),
+    Rule(
+        ("EKF2_EV_NOISE_MD",),
+        one_of(0),
+        "0 (as the message says)",
+        "the variances that are sent say what is not known",
+        0,
+        optional=True,
+    ),
+)
+
+
+def pose_rules(firmware: Firmware, choice: PoseChoice, *, landing_target: bool) -> tuple[Rule, ...]:
+    """What has to be set for `vehicle.pose_output`: only advised where that is left to the autopilot."""
+    if choice == "none":
+        return (_ARDUPILOT_NONE,) if firmware is Firmware.ARDUPILOT else ()
+    tells_speed = choice != "vision_position"
+    if firmware is Firmware.ARDUPILOT:
+        rules = tuple(rule for rule in _ARDUPILOT if tells_speed or rule is not _ARDUPILOT_SPEED)
+    else:
+        bits = (_SPEED if tells_speed else _PLACE) | (_PLACE if landing_target else 0)
+        rules = (_ev_ctrl(bits), *_PX4_TIMES)
+    return tuple(replace(rule, advised=choice == "auto") for rule in rules)
+
+
+def _ev_ctrl(bits: int) -> Rule:
+    """It takes these, perhaps the place too, neither height nor heading."""
+    names = {_SPEED: "4 (speed)", _PLACE: "1 (place)", _SPEED | _PLACE: "5 (speed and place)"}
+    return Rule(
+        ("EKF2_EV_CTRL",),
+        lambda value: int(value) & bits == bits and not int(value) & (_HEIGHT | _HEADING),
+        f"{names[bits]}, without bits 1 and 3 (height and heading)",
+        f"{_TAKEN}; {_OWN_HEADING}",
+        bits,
+    )
