@@ -58,8 +58,8 @@ class PoseTaker(Protocol):
     """A vehicle whose own estimator can use the grid pose."""
 
     def share_pose(self, pose: SharedPose | None, pad_m: tuple[float, float] | None = None) -> None:
-        """At each tick: what a new frame tells of the motion, None where there is none or it tells nothing; and
-        the place of the charge pad on the map (metres) if it shall land by it.  Never blocks."""
+        """At each tick: what a new frame tells of the motion, None where there is none or it tells nothing;
+        and the place of the charge pad on the map (metres) if it shall land by it.  Never blocks."""
         ...
 
 

@@ -57,16 +57,16 @@ class VehicleConfig(Section):
     )
     pose_output: PoseChoice = Field(
         "auto",
-        description="message that tells the autopilot's estimator of our motion, at 30 Hz at most, so that its "
-        "attitude stays level; auto: odometry where an ArduCopter's or PX4's parameters take it, else none",
+        description="message that tells the autopilot's estimator of our motion, at 30 Hz at most, so that "
+        "its attitude stays true; auto: odometry where an ArduCopter's or PX4's parameters take it",
     )
     origin_deg: tuple[
         Annotated[float, Field(ge=-90, le=90)],
         Annotated[float, Field(ge=-180, le=180)],
     ] = Field(
         (51.4778, 0.0),
-        description="ArduCopter that takes pose_output: the hall's latitude and longitude, roughly; its estimator "
-        "has to have some",
+        description="ArduCopter that takes pose_output: the hall's latitude and longitude, roughly; its "
+        "estimator has to have some",
     )
     range_finder: int | None = Field(
         None,
@@ -109,8 +109,8 @@ class VehicleConfig(Section):
             raise ValueError("signing_stamp without signing_key: give the key too, or take it out")
         if self.landing_target and self.pose_output in {"auto", "none"}:
             raise ValueError(
-                'landing_target needs pose_output = "odometry": precision landing flies by the autopilot\'s own '
-                "position, which must not be left to its parameters"
+                'landing_target needs pose_output = "odometry": precision landing flies by the autopilot\'s '
+                "own position, which must not be left to its parameters"
             )
         return self
 

@@ -197,8 +197,8 @@ class StateEstimator:
         return Estimate(height_m, tracks, by_pad or pose, by_pad is not None, lead, conditions, shared)
 
     def _shared(self, now_ns: int, pose: GridPose) -> SharedPose | None:
-        """What a new frame tells the vehicle's own estimator; nothing of lines that the map does not have, nor
-        over heights that a stuck range finder made.
+        """What a new frame tells the vehicle's own estimator; nothing of lines that the map does not have,
+        nor over heights that a stuck range finder made.
 
         The motion hangs on the lines, not on which node they belong to: of two places that are confused it is
         the same.  Only once no place is likelier than all others the lines themselves are doubted."""

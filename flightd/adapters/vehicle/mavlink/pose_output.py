@@ -1,10 +1,10 @@
 """What the autopilot's own estimator is told of our motion, and the charge pad for its precision landing.
 
 The local frame sent is the autopilot's own: z down, turned as it believes to be turned itself (its compass or
-gyro), and begun where the first pose was sent.  So it can take speed and way of us, which show it what is level,
-and nothing of its heading: a doubted heading of ours cannot turn it, and its heading does not leap when poses
-begin, end or are corrected.  Its yaw must therefore not come from us (EK3_SRC1_YAW, EKF2_EV_CTRL bit 3).
-"""
+gyro), and begun where the first pose was sent.  So it can take speed and way of us, which show it what is
+level, and nothing of its heading: a doubted heading of ours cannot turn it, and its heading does not leap
+when poses begin, end or are corrected.  Its yaw must therefore not come from us (EK3_SRC1_YAW, EKF2_EV_CTRL
+bit 3)."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from flightd.core.types import Attitude
 
 _VISION = dialect.MAV_ESTIMATOR_TYPE_VISION
 _SHARED_READINGS = 10.0
-"""What a frame's motion errs by (the told attitude, the mount, a gust) lasts for about so many of them, and an
-estimator counts each as new evidence: so much larger are the variances that it is told."""
+"""What a frame's motion errs by (the told attitude, the mount, a gust) lasts for about so many of them, and
+an estimator counts each as new evidence: so much larger are the variances that it is told."""
 _LEAST_SPEED_VARIANCE_M2PS2 = 0.03**2
 _UNKNOWN_SPEED_VARIANCE_M2PS2 = 5.0**2
 """Also of the climb: what we know of it the autopilot has told."""
@@ -43,8 +43,8 @@ class PoseForm(StrEnum):
 
 
 class PoseOutput:
-    """Poses at no more than `rate_hz`, with the count of what the estimator is to forgive: each gap in them, and
-    each correction of the place on the map."""
+    """Poses at no more than `rate_hz`, with the count of what the estimator is to forgive: each gap in them,
+    and each correction of the place on the map."""
 
     def __init__(
         self, form: PoseForm, firmware: Firmware, rate_hz: float = 30.0, jump_m: float = 0.3
@@ -103,8 +103,8 @@ class PoseOutput:
         return vision_position(pose, self.place_m, self.resets)
 
     def _follow(self, pose: SharedPose) -> None:
-        """Go on by the way since the last pose.  A correction of the place on the map is no way that was flown;
-        what was flown in a gap is not known as well as if it had been seen."""
+        """Go on by the way since the last pose.  A correction of the place on the map is no way that was
+        flown; what was flown in a gap is not known as well as if it had been seen."""
         last, self._last = self._last, pose
         gap = pose.stamp_ns - self._last_ns > _GAP_NS
         self._last_ns = pose.stamp_ns
@@ -186,8 +186,8 @@ def vision_position(pose: SharedPose, place_m: tuple[float, float], resets: int)
 def landing_target(
     firmware: Firmware, pose: SharedPose, pad_m: tuple[float, float], local_m: tuple[float, float]
 ) -> Message:
-    """LANDING_TARGET for a pad at map position `pad_m`, in the frame that the firmware wants; `local_m` is its
-    place in the frame of the poses that are sent.
+    """LANDING_TARGET for a pad at map position `pad_m`, in the frame that the firmware wants; `local_m` is
+    its place in the frame of the poses that are sent.
 
     ArduPilot: the vector in BODY_FRD, which it turns by roll and pitch too, its length above zero.  PX4:
     the pad's place in the local frame, which is that of our poses when it fuses them.

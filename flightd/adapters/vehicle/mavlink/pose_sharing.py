@@ -18,8 +18,8 @@ _STANDS_BELOW_M = 0.3
 
 
 class PoseSharing:
-    """Call `messages` at each tick.  Nothing goes out with `form` None, nor before the autopilot's parameters were
-    read and fit all `rules` but those that are optional."""
+    """Call `messages` at each tick.  Nothing goes out with `form` None, nor before the autopilot's parameters
+    were read and fit all `rules` but those that are optional."""
 
     def __init__(
         self,

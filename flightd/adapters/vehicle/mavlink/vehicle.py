@@ -202,8 +202,9 @@ class MavlinkVehicle(abc.ABC):
         return self.link.dropped
 
     def share_pose(self, pose: SharedPose | None, pad_m: tuple[float, float] | None = None) -> None:
-        """Tell the autopilot's estimator of the motion, at 30 Hz at most, if a `pose_form` was chosen and it takes
-        it; with `pad_m`, a place on the map, also the target of its precision landing while it is near."""
+        """Tell the autopilot's estimator of the motion, at 30 Hz at most, if a `pose_form` was chosen and it
+        takes it; with `pad_m`, a place on the map, also the target of its precision landing while it is
+        near."""
         now_ns = self._clock.now_ns()
         state = self._telemetry.state(now_ns, "", in_control=False, refusal=None)
         if state is not None:
