@@ -13,7 +13,7 @@ class SharedPose:
     """Where the drone was, and how it moved, at the exposure of one frame, by what that frame showed.
 
     `attitude` is the one told for that moment, `yaw_rad` the heading on the map, position and velocity are in
-    map axes.  The variances are of what the floor tells: infinite for the speed along an axis of which the
+    map axes.  The variances are of what the floor tells: NaN for the speed along an axis of which the
     frame tells nothing, since what is carried on by the told attitude is no evidence of that attitude.
     `corrections` counts how often the place on the map was found to be another one than was believed.
     """
@@ -35,4 +35,4 @@ class SharedPose:
     @property
     def tells_both(self) -> bool:
         """Whether the frame tells the speed along both axes."""
-        return all(math.isfinite(variance) for variance in self.speed_variances)
+        return not any(math.isnan(variance) for variance in self.speed_variances)

@@ -210,10 +210,10 @@ class StateEstimator:
         self._shared_ns = seen_ns
         told_ns = self.localiser.told_ns
         x_variance, y_variance = (
-            variance if seen_ns - told_ns[axis] < _GAP_NS else math.inf
+            variance if seen_ns - told_ns[axis] < _GAP_NS else math.nan
             for axis, variance in enumerate(motion.variances)
         )
-        if math.isinf(x_variance) and math.isinf(y_variance):
+        if math.isnan(x_variance) and math.isnan(y_variance):
             return None
         return SharedPose(
             stamp_ns=seen_ns,

@@ -83,7 +83,7 @@ NO_LEAD = Lead(0.0, 0.0, 0.0, 0.0, 0.0)
 
 class ExposureMotion(NamedTuple):
     """The motion at the exposure of the newest frame: the attitude told for then, heading, speed along the
-    grid axes with its variances (infinite along an axis of which that frame tells nothing), and the way
+    grid axes with its variances (NaN along an axis of which that frame tells nothing), and the way
     since."""
 
     attitude: Attitude
@@ -250,7 +250,7 @@ class LineTracker:
         variances = [
             held.sigma(VX + axis) ** 2
             if by_lines[axis] is not None or self._features_ns[axis] == self._stamp_ns
-            else math.inf
+            else math.nan
             for axis in range(2)
         ]
         return ExposureMotion(

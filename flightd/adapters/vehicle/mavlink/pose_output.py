@@ -228,7 +228,9 @@ def _pose_covariance(pose: SharedPose) -> list[float]:
 def _speed_covariance(pose: SharedPose) -> list[float]:
     """Upper triangle over the speeds in body axes and the turn rates, which are not told."""
     x, y = (
-        min(max(variance, _LEAST_SPEED_VARIANCE_M2PS2) * _SHARED_READINGS, _UNKNOWN_SPEED_VARIANCE_M2PS2)
+        _UNKNOWN_SPEED_VARIANCE_M2PS2
+        if math.isnan(variance)
+        else max(variance, _LEAST_SPEED_VARIANCE_M2PS2) * _SHARED_READINGS
         for variance in pose.speed_variances
     )
     forward, cross, right = _turned_variances((x, y), -pose.yaw_rad)
