@@ -10,9 +10,9 @@ from flightd.config.vehicle import PoseChoice
 
 _PLACE, _HEIGHT, _SPEED, _HEADING = 1, 2, 4, 8
 """Bits of EKF2_EV_CTRL."""
-_TAKEN = "by the motion that it is told (vehicle.pose_output) its attitude stays level; by itself it drifts"
-_UNHEARD = "else the motion that it is told (vehicle.pose_output) is not heard"
-_OWN_HEADING = "its heading must be its own: by ours it would leap where poses begin, end or are corrected"
+_TAKEN = "by our motion (vehicle.pose_output) its attitude stays true, its heading must be its own"
+_UNHEARD = "else our motion (vehicle.pose_output) is not heard"
+_OWN_HEADING = "by ours its heading would leap where poses begin, end or are corrected"
 
 _ARDUPILOT_SPEED = Rule(("EK3_SRC1_VELXY",), one_of(6), "6 (external)", _TAKEN, 6)
 _ARDUPILOT = (
@@ -72,11 +72,15 @@ def pose_rules(firmware: Firmware, choice: PoseChoice, *, landing_target: bool) 
 
 def _ev_ctrl(bits: int) -> Rule:
     """It takes these, perhaps the place too, neither height nor heading."""
-    names = {_SPEED: "4 (speed)", _PLACE: "1 (place)", _SPEED | _PLACE: "5 (speed and place)"}
+    expected = {
+        _SPEED: "4 (speed) or 5 (place too), without height and heading (bits 1 and 3)",
+        _PLACE: "1 (place) or 5 (speed too), without height and heading (bits 1 and 3)",
+        _SPEED | _PLACE: "5 (speed and place), without height and heading (bits 1 and 3)",
+    }
     return Rule(
         ("EKF2_EV_CTRL",),
         lambda value: int(value) & bits == bits and not int(value) & (_HEIGHT | _HEADING),
-        f"{names[bits]}, without bits 1 and 3 (height and heading)",
-        f"{_TAKEN}; {_OWN_HEADING}",
+        expected[bits],
+        _TAKEN,
         bits,
     )

@@ -29,19 +29,14 @@ class PoseSharing:
         read: Read,
     ) -> None:
         self._output = None if form is None else PoseOutput(form, firmware)
-        self._rules = tuple(rule for rule in rules if not rule.optional)
-        self._firmware, self._read = firmware, read
+        self._firmware, self._rules, self._read = firmware, rules, read
 
     @property
     def use(self) -> PoseUse:
         """What becomes of our motion, by what is known of the autopilot's parameters."""
         if self._output is None:
             return PoseUse.NONE
-        found = [(rule, self._read(rule.names)) for rule in self._rules]
-        if any(value is None for _, value in found):
-            return PoseUse.UNKNOWN
-        fits = all(judge(rule, value) is None for rule, value in found)
-        return PoseUse.GIVEN if fits else PoseUse.NOT_TAKEN
+        return pose_use(self._rules, self._read)
 
     def messages(
         self,
@@ -65,6 +60,15 @@ class PoseSharing:
         yield message
         if pose is not None and pad_m is not None and math.dist(pad_m, (pose.x_m, pose.y_m)) < _PAD_NEAR_M:
             yield landing_target(self._firmware, pose, pad_m, output.at_place(pose, pad_m))
+
+
+def pose_use(rules: tuple[Rule, ...], read: Read) -> PoseUse:
+    """What becomes of our motion by an autopilot's parameters, of those `rules` that are not optional."""
+    needed = [(rule, read(rule.names)) for rule in rules if not rule.optional]
+    if any(value is None for _, value in needed):
+        return PoseUse.UNKNOWN
+    fits = all(judge(rule, value) is None for rule, value in needed)
+    return PoseUse.GIVEN if fits else PoseUse.NOT_TAKEN
 
 
 def _stands(state: VehicleState) -> bool:

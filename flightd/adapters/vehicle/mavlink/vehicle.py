@@ -128,6 +128,7 @@ class MavlinkVehicle(abc.ABC):
         self._way_down = way_down_rules(self._rules)
         self._examined = False
         """All that the autopilot answers of its parameters was read."""
+        self._told_use = PoseUse.NONE
         self._reboots = 0
         self._version = ""
         self._heard = asyncio.Event()
@@ -349,8 +350,20 @@ class MavlinkVehicle(abc.ABC):
                     await self.parameters.read_again(names)
                 await self.parameters.read_all(names)
                 self._examined = reboots == self._reboots
+                self._tell_pose_use()
             complete = all(rule.optional or self.parameters.get(rule.names) for rule in self._way_down)
             await asyncio.sleep(_EXAMINE_AGAIN_S if self._examined and complete else _EXAMINE_S)
+
+    def _tell_pose_use(self) -> None:
+        """Tell people whenever the autopilot's estimator begins or ceases to take our motion."""
+        before, self._told_use = self._told_use, self._pose.use
+        if self._told_use is before or self._told_use is PoseUse.NONE:
+            return
+        given = self._told_use is PoseUse.GIVEN
+        text = "its estimator takes our motion" if given else "its estimator does not take our motion"
+        _LOG.info("%s", text)
+        level = EventLevel.INFO if given else EventLevel.WARNING
+        self.notify(Event(self._clock.now_ns(), level, "pose_output", text))
 
     async def _mind_beats(self) -> None:
         """Tell people once, when the heartbeats stay too far apart to see a take-over in time."""

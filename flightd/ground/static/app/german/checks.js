@@ -3,6 +3,11 @@ export default {
   // their names
   "vehicle": "Fluggerät",
   "parameter": "Parameter",
+  "pose": "Position",
+  "the autopilot's estimator takes our motion": "der Schätzer des Autopiloten nimmt unsere Bewegung an",
+  "the autopilot's estimator does not take our motion": "der Schätzer des Autopiloten nimmt unsere Bewegung nicht an",
+  "its parameters do not say whether the autopilot's estimator takes our motion": "seine Parameter sagen nicht, ob der Schätzer des Autopiloten unsere Bewegung annimmt",
+  "set what is named of its parameters; without, it flies as well as its attitude is": "stellen Sie ein, was von seinen Parametern genannt ist; ohne das fliegt er so gut, wie seine Lage ist",
   "camera": "Kamera",
   "exposure": "Belichtung",
   "front exposure": "Belichtung vorn",
