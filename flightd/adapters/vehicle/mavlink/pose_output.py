@@ -53,7 +53,7 @@ class PoseOutput:
         self._period_ns = round(1e9 / rate_hz)
         self._jump_m = jump_m
         self._last: SharedPose | None = None
-        self._last_ns = 0
+        self._last_ns: int | None = None
         self._due_ns = 0
         self.resets = 0
         self.place_m = 0.0, 0.0
@@ -106,7 +106,7 @@ class PoseOutput:
         """Go on by the way since the last pose.  A correction of the place on the map is no way that was
         flown; what was flown in a gap is not known as well as if it had been seen."""
         last, self._last = self._last, pose
-        gap = pose.stamp_ns - self._last_ns > _GAP_NS
+        gap = self._last_ns is not None and pose.stamp_ns - self._last_ns > _GAP_NS
         self._last_ns = pose.stamp_ns
         if last is None:
             if gap:
