@@ -23,8 +23,8 @@ _ARDUPILOT = (
     Rule(
         ("VISO_DELAY_MS",),
         within(40, 200),
-        "40 to 200 ms, from the exposure until its pose arrives",
-        "it reckons so for the fastest pose, whatever time that carries",
+        "40 to 200 ms",
+        "the fastest pose is taken to be so old, whatever time it carries",
         80,
         optional=True,
     ),
@@ -37,23 +37,9 @@ _ARDUPILOT_NONE = Rule(
     0,
     optional=True,
 )
-_PX4_TIMES = (
-    Rule(
-        ("EKF2_EV_DELAY",),
-        within(0, 20),
-        "0 ms",
-        "poses carry the time of their exposure",
-        0,
-        optional=True,
-    ),
-    Rule(
-        ("EKF2_EV_NOISE_MD",),
-        one_of(0),
-        "0 (as the message says)",
-        "the variances that are sent say what is not known",
-        0,
-        optional=True,
-    ),
+_PX4_TIMES = tuple(
+    Rule((name,), within(0, most), "0 (none)", "poses carry their own time and variances", 0, optional=True)
+    for name, most in (("EKF2_EV_DELAY", 20), ("EKF2_EV_NOISE_MD", 0))
 )
 
 
@@ -71,16 +57,11 @@ def pose_rules(firmware: Firmware, choice: PoseChoice, *, landing_target: bool) 
 
 
 def _ev_ctrl(bits: int) -> Rule:
-    """It takes these, perhaps the place too, neither height nor heading."""
-    expected = {
-        _SPEED: "4 (speed) or 5 (place too), without height and heading (bits 1 and 3)",
-        _PLACE: "1 (place) or 5 (speed too), without height and heading (bits 1 and 3)",
-        _SPEED | _PLACE: "5 (speed and place), without height and heading (bits 1 and 3)",
-    }
+    """It takes these at least, and neither height nor heading."""
     return Rule(
         ("EKF2_EV_CTRL",),
         lambda value: int(value) & bits == bits and not int(value) & (_HEIGHT | _HEADING),
-        expected[bits],
+        f"{bits}, without height and heading (bits 1 and 3)",
         _TAKEN,
         bits,
     )
