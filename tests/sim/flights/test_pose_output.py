@@ -18,7 +18,7 @@ from tests.rigs.small_camera import with_small_camera
 
 
 @pytest.mark.slow
-def test_a_flight_shares_its_pose_at_thirty_hertz_and_the_pad_while_near(
+def test_a_flight_tells_its_motion_by_every_frame_and_the_pad_while_near(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     heard: dict[str, list[tuple[Any, Any]]] = {"ODOMETRY": [], "LANDING_TARGET": []}
@@ -42,7 +42,7 @@ def test_a_flight_shares_its_pose_at_thirty_hertz_and_the_pad_while_near(
     assert result.phase is Phase.DONE
     poses, targets = heard["ODOMETRY"], heard["LANDING_TARGET"]
     span_s = (poses[-1][0].time_usec - poses[0][0].time_usec) * 1e-6
-    assert len(poses) / span_s == pytest.approx(30.0, rel=0.1)
+    assert 18.0 < len(poses) / span_s < 31.0  # by frames in the air, thirty times while it stands
     errors_mps = sorted(
         abs(math.hypot(message.vx, message.vy) - math.hypot(truth.vx_mps, truth.vy_mps))
         for message, truth in poses
