@@ -40,7 +40,7 @@ OTHERS_HZ = 32
 POSE = SharedPose(
     0, Attitude(0, 0.0, 0.0, 0.0), 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01, 0.01), (0.01, 0.01), 0.01, 0.9
 )
-TAKES = {"VISO_TYPE": 1.0, "EK3_SRC1_POSXY": 6.0, "EK3_SRC1_VELXY": 6.0}
+TAKES = {"VISO_TYPE": 1.0, "EK3_SRC1_POSXY": 6.0, "EK3_SRC1_VELXY": 6.0, "FS_EKF_ACTION": 1.0}
 """By these the autopilot's estimator takes our motion."""
 MIXTURE = ("attitude",) * 6 + ("distance", "position", "heartbeat", "battery")
 

@@ -10,9 +10,9 @@ from flightd.config.vehicle import PoseChoice
 
 _PLACE, _HEIGHT, _SPEED, _HEADING = 1, 2, 4, 8
 """Bits of EKF2_EV_CTRL."""
-_TAKEN = "by our motion (vehicle.pose_output) its attitude stays true, its heading must be its own"
+_TAKEN = "by our motion (vehicle.pose_output) its attitude stays true"
 _UNHEARD = "else our motion (vehicle.pose_output) is not heard"
-_OWN_HEADING = "by ours its heading would leap where poses begin, end or are corrected"
+_OWN_HEADING = "by ours its heading would leap"
 
 _ARDUPILOT_SPEED = Rule(("EK3_SRC1_VELXY",), one_of(6), "6 (external)", _TAKEN, 6)
 _ARDUPILOT = (
@@ -20,11 +20,12 @@ _ARDUPILOT = (
     Rule(("EK3_SRC1_POSXY",), one_of(6), "6 (external)", _TAKEN, 6),
     _ARDUPILOT_SPEED,
     Rule(("EK3_SRC1_YAW",), one_of(0, 1), "1 (compass) or 0 (gyro)", _OWN_HEADING, 1),
+    Rule(("FS_EKF_ACTION",), one_of(1), "1 (land)", "by 3 it lands wherever our motion ends for a second", 1),
     Rule(
         ("VISO_DELAY_MS",),
         within(40, 200),
         "40 to 200 ms",
-        "the fastest pose is taken to be so old, whatever time it carries",
+        "the fastest pose is taken to be so old",
         80,
         optional=True,
     ),
@@ -33,7 +34,7 @@ _ARDUPILOT_NONE = Rule(
     ("VISO_TYPE",),
     one_of(0),
     "0 (none)",
-    "it is not armed as long as no poses come, and none are sent (vehicle.pose_output)",
+    "else it waits for poses and is not armed",
     0,
     optional=True,
 )
