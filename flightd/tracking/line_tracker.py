@@ -83,8 +83,7 @@ NO_LEAD = Lead(0.0, 0.0, 0.0, 0.0, 0.0)
 
 class ExposureMotion(NamedTuple):
     """The motion at the exposure of the newest frame: the attitude told for then, heading, speed along the
-    grid axes with its variances (NaN along an axis of which that frame tells nothing), and the way
-    since."""
+    grid axes with its variances (NaN along an axis of which that frame tells nothing), and the way since."""
 
     attitude: Attitude
     yaw_rad: float

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.ports import Clock
 from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
-from flightd.sim.autopilot.external_vision import NOT_TAKEN, ExternalVision, Taken
+from flightd.sim.autopilot.external_vision import ExternalVision, Taken
 from flightd.sim.autopilot.link import Address, MavlinkChannel, Message, UdpLink
 from flightd.sim.autopilot.parameters import ParameterServer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
@@ -304,9 +304,9 @@ class AutopilotPeer(abc.ABC):
     def _setpoint(self, message: Message) -> None:
         """Take a SET_ATTITUDE_TARGET that is addressed to this system."""
 
+    @abc.abstractmethod
     def _taken(self) -> Taken:
         """What its parameters say of poses that it is told."""
-        return NOT_TAKEN
 
     @abc.abstractmethod
     def _exposed_ns(self, stamp_ns: int, now_ns: int) -> int:

@@ -4,7 +4,8 @@ The local frame sent is the autopilot's own: z down, turned as it believes to be
 gyro), and begun where the first pose was sent.  So it can take speed and way of us, which show it what is
 level, and nothing of its heading: a doubted heading of ours cannot turn it, and its heading does not leap
 when poses begin, end or are corrected.  Its yaw must therefore not come from us (EK3_SRC1_YAW, EKF2_EV_CTRL
-bit 3)."""
+bit 3).
+"""
 
 from __future__ import annotations
 
@@ -32,6 +33,8 @@ _TILT_VARIANCE_RAD2 = math.radians(5.0) ** 2
 _YAW_VARIANCE_RAD2 = math.radians(30.0) ** 2
 """Roll, pitch and yaw that are sent are the autopilot's own: no evidence."""
 _STANDING_PLACE_VARIANCE_M2 = 0.02**2
+_STANDING_AGE_NS = 200_000_000
+"""Older than any frame when it is told: ArduPilot reckons by the youngest message of late."""
 _GAP_NS = 500_000_000
 
 
@@ -74,7 +77,7 @@ class PoseOutput:
             self._count_reset()
         self._last_ns = attitude.stamp_ns
         pose = SharedPose(
-            stamp_ns=attitude.stamp_ns,
+            stamp_ns=attitude.stamp_ns - _STANDING_AGE_NS,
             attitude=attitude,
             yaw_rad=attitude.yaw_rad,
             x_m=0.0,
