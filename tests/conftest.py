@@ -4,49 +4,25 @@ Those marked `realtime` do depend on it: see `tests.rigs.machine`; those in a br
 
 from __future__ import annotations
 
+import gc
 import os
-import re
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
-from xdist.scheduler.loadscope import LoadScopeScheduling
 
 from tests.command import Command
 from tests.rigs.machine import Meter, Needs, Patience
 from tests.rigs.recorded_flight import fly_once
+from tests.rigs.schedule import FromBothEnds, cores_of, in_browser, in_order
 
 settings.register_profile(
     "flightd", deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("flightd")
 
-_COSTLY = {
-    "tests/bench/test_vision_cost.py",
-    "tests/replay/test_decisions.py",
-    "tests/replay/test_log_command.py",
-    "tests/replay/test_playback.py",
-    "tests/replay/test_report.py",
-    "tests/replay/test_report_inventory.py",
-    "tests/sim/flights/test_scan_flight.py",
-    "tests/sim/ideal/test_height_changes.py",
-    "tests/sim/pictures/test_shelf_reading.py",
-    "tests/unit/cli/test_vision_commands.py",
-    "tests/unit/foxglove/test_logged_for_viewers.py",
-    "tests/web/test_flight_folder.py",
-    "tests/web/test_flight_functions.py",
-    "tests/web/test_flight_fuzz.py",
-    "tests/web/test_flights_api.py",
-    "tests/web/test_navigation.py",
-    "tests/web/test_studio_api.py",
-}
-_ON_ONE_DATABASE = "tests/unit/ground_store/"
-_IN_BROWSER = re.compile(r"tests/web/test_(?:\w*page|language)\.py")
-"""Each starts a Chromium, and a station for all its tests."""
-_PAGES_WITHIN = 0.9
-"""Of the flights: by then all pages have begun."""
 _IN_CI = os.environ.get("CI", "") == "true"
 _PATIENCE = pytest.StashKey[Patience]()
 
@@ -64,46 +40,27 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whole flights first, and spread among them what needs a browser: a flight computes, a page mostly
-    waits, and one that began last would keep one core busy while the other waits.  Of those by the clock come
-    last what needs little of the machine: they are short.  What the machine's speed may make fail, by the
-    clock or in a browser, is tried once more, and told."""
+    """What the machine's speed may make fail, by the clock or in a browser, is tried once more, and told."""
     for item in items:
-        if _cores_of(item) or _IN_BROWSER.match(item.nodeid):
+        if cores_of(item) or in_browser(item.nodeid):
             item.add_marker(pytest.mark.flaky(reruns=1))
-    flights = [item for item in items if "/sim/" in item.nodeid]
-    flights.sort(key=lambda item: item.get_closest_marker("slow") is None)
-    turn = {item.nodeid: number / len(flights) for number, item in enumerate(flights)}
-    pages = list(dict.fromkeys(_module(item.nodeid) for item in items if _IN_BROWSER.match(item.nodeid)))
-    among = {module: _PAGES_WITHIN * number / len(pages) for number, module in enumerate(pages)}
-    items.sort(
-        key=lambda item: (-_cores_of(item), turn.get(item.nodeid, among.get(_module(item.nodeid), 1.0)))
-    )
+    in_order(items)
 
 
-def _module(nodeid: str) -> str:
-    return nodeid.partition("::")[0]
-
-
-def _cores_of(item: pytest.Item) -> float:
-    """What a test that flies by the clock needs free; 0: another one."""
-    marker = item.get_closest_marker("realtime")
-    return 0.0 if marker is None else Needs(**marker.kwargs).cores
-
-
-class _CostlyTogether(LoadScopeScheduling):  # type: ignore[misc]  # its library has no types
-    """The tests of a module that share what took long to make stay on one worker; others go anywhere."""
-
-    def _split_scope(self, nodeid: str) -> str:
-        if nodeid.startswith(_ON_ONE_DATABASE):
-            return _ON_ONE_DATABASE
-        module = _module(nodeid)
-        return module if module in _COSTLY or _IN_BROWSER.fullmatch(module) else nodeid
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What a run has collected stays to its end: nobody looks through it for garbage again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
-    return _CostlyTogether(config, log)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> FromBothEnds:
+    return FromBothEnds(config, log)
 
 
 @pytest.hookimpl(wrapper=True)

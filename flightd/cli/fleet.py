@@ -13,6 +13,8 @@ from flightd.cli.options import AsJson
 from flightd.cli.tables import stdout
 from flightd.core.errors import RunError
 
+_DOCK_LINES = 6
+
 
 def register(app: typer.Typer) -> None:
     """Hang the commands under `app`."""
@@ -32,6 +34,11 @@ def sim(
     closes: Annotated[
         bool, typer.Option("--close/--no-close", help="Close an aisle for a tenth of the hours.")
     ] = True,
+    swaps: Annotated[int, typer.Option(min=0, max=20, help="Docks that swap a battery, for all.")] = 0,
+    contacts: Annotated[int, typer.Option(min=0, max=20, help="Docks that charge by contact, for all.")] = 0,
+    misaligned: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Share of landings without contact, on these.")
+    ] = 0.1,
     compare: Annotated[
         bool, typer.Option("--compare", help="Fly one drone alone, too: the speed-up.")
     ] = False,
@@ -40,7 +47,8 @@ def sim(
     """Let a fleet count a hall in a fast world without pixels, and judge it by where the drones truly are.
 
     Their pace is not what is planned, links are cut, positions doubted, batteries drawn and charged; drones
-    fail between shelves, and an aisle is closed.  Bad is: a shared cell, a deadlock, a battery below its
+    fail between shelves, and an aisle is closed.  Each is charged on its own pad, unless there are docks,
+    which all of them share then.  Bad is: a shared cell, a deadlock, a battery below its
     reserve, a place that is neither counted nor has a reason why not.
 
     \b
@@ -48,10 +56,22 @@ def sim(
       flightd fleet sim
       flightd fleet sim --drones 3 --aisles 8 --nodes 6 --hours 1
       flightd fleet sim --seed 7 --compare --json
+      flightd fleet sim --swaps 1 --contacts 3
     """
     from flightd.sim.fleet.simulation import FleetScenario, alone, fly_fleet
 
-    scenario = FleetScenario(drones, aisles, nodes, hours, seed, failing, closes_aisle=closes)
+    scenario = FleetScenario(
+        drones,
+        aisles,
+        nodes,
+        hours,
+        seed,
+        failing,
+        closes_aisle=closes,
+        swaps=swaps,
+        contacts=contacts,
+        misaligned=misaligned,
+    )
     result = fly_fleet(scenario)
     document = result.document()
     if compare:
@@ -75,6 +95,7 @@ def _in_words(d: dict[str, object]) -> list[str]:
         f"least distance of two drones {d['least_distance_m']} m, least charge {d['least_charge']},"
         f" planned {d['replans']} times",
     ]
+    lines += _dock_lines(d)
     if d["failed"]:
         lines.append(f"failed: {', '.join(map(str, _listed(d['failed'])))}")
     reasons: dict[str, list[str]] = {}
@@ -85,6 +106,18 @@ def _in_words(d: dict[str, object]) -> list[str]:
     if "speed_up" in d:
         lines.append(f"speed-up over one drone {d['speed_up']}")
     return lines
+
+
+def _dock_lines(d: dict[str, object]) -> list[str]:
+    """None without docks."""
+    if "docks" not in d:
+        return []
+    docks = [dock for dock in _listed(d["docks"]) if isinstance(dock, dict)]
+    told = [f"{dock['dock']} ({dock['kind']}) {dock['landings']}" for dock in docks]
+    lines = [f"landings on docks: {', '.join(told)}; waited for one {_hours(d['waited_for_docks_s'])}"]
+    shown = _listed(d["docks_told"])[:_DOCK_LINES]
+    more = int(str(d["docks_told_count"])) - len(shown)
+    return [*lines, *map(str, shown), *([f"and {more} more of docks"] if more > 0 else [])]
 
 
 def _listed(value: object) -> list[object]:

@@ -35,7 +35,7 @@ class HazardExpert(Section):
     search_s: float = Field(0.0, ge=0, le=60, description="lines lost for so long: climb to see more")
     search_climb_m: float = Field(0.3, ge=0, le=0.5, description="by how much, below the ceiling")
     search_land_s: float = Field(1.4, ge=0.3, le=60, description="pictures without lines for so long: land")
-    blind_land_s: float = Field(2.2, ge=0.3, le=60, description="nothing seen at all for so long: land")
+    blind_land_s: float = Field(1.7, ge=0.3, le=60, description="nothing seen at all for so long: land")
     blind_m: float = Field(0.5, ge=0.2, le=20, description="with nothing seen sink at once, down to here")
 
 

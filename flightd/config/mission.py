@@ -53,7 +53,7 @@ class MissionExpert(Section):
     touch_below_m: float = Field(0.35, gt=0, le=5, description="the last stretch of a landing begins here")
     touch_mps: float = Field(0.20, gt=0, le=1, description="rate of the last stretch of a landing")
     blind_mps: float = Field(0.9, gt=0, le=3, description="fastest descent without a view of the floor")
-    touch_blind_mps: float = Field(0.3, gt=0, le=1, description="slowest of it, near the floor")
+    touch_blind_mps: float = Field(0.4, gt=0, le=1, description="slowest of it, near the floor")
     lines_found_s: float = Field(
         1.0, ge=0, le=30, description="lines seen for so long end the time for which they were lost"
     )

@@ -27,7 +27,7 @@ class MotionNoise(Section):
     start_velocity_mps: float = Field(0.3, gt=0, le=5, description="sigma of the velocity at first")
     start_disturbance_mps2: float = Field(0.2, gt=0, le=5, description="sigma of the disturbance at first")
     max_disturbance_mps2: float = Field(1.2, gt=0, le=10, description="largest disturbance believed")
-    gust_s: float = Field(1.2, gt=0, le=60, description="time within which a gust fades")
+    gust_s: float = Field(2.5, gt=0, le=60, description="time within which a gust fades")
     steady_s: float = Field(10.0, gt=0, le=600, description="time over which the steady part is averaged")
 
 

@@ -18,6 +18,7 @@ from flightd.localisation.pad_finder import PadFinder
 from flightd.localisation.pose_history import PoseHistory
 from flightd.site.site import Site
 from flightd.tracking.attitude_response import AttitudeResponse
+from flightd.tracking.carried_height import CarriedHeight
 from flightd.tracking.climb_doubt import ClimbDoubt
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
@@ -36,7 +37,8 @@ _MAP_SIGMA_M = 0.02
 _SILENT_S = 0.1
 """A vehicle whose newest attitude is older than usual by so much is not waited for."""
 _CLIMB_DOUBT_M = 1.0
-"""Below, the rotors' own wash moves the barometer, and the adapter holds rate and height apart."""
+"""Below, the rotors' own wash moves the barometer, and the adapter holds rate and height apart.  A climb that
+was found to be wrong is put right down to the floor."""
 _GAP_NS = 100_000_000
 """Frames further apart do not follow each other."""
 _LEAST_INTEGRITY = 0.5
@@ -117,6 +119,7 @@ class StateEstimator:
         self.climb = ClimbDoubt()
         self._climbed = HeightHistory()
         self._climbed_m, self._climb_ns = 0.0, 0
+        self._carried = CarriedHeight()
         self._waiting: deque[LineSet] = deque()
         self._judged_ns = self._shared_ns = 0
         self._frames_s = 0.0
@@ -146,6 +149,8 @@ class StateEstimator:
             if not self._stuck.found:
                 self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
             self._count_climb(tick.now_ns, v.climb_mps)
+            if not self._stuck.found and not math.isnan(v.height_m):
+                self._carry_height(v.height_stamp_ns)
             self._mind_height(tick.now_ns, v, commanded)
         self._waiting += (lines for lines in tick.lines if self.frames.take(lines) and self.armed)
         while self._waiting and self._is_due(self._waiting[0], tick.now_ns):
@@ -184,7 +189,10 @@ class StateEstimator:
         """The motion now."""
         height_m = self._heights.at(now_ns)
         tracks = self.tracker.at(now_ns)
-        pose = None if tracks is None else self.localiser.step(tracks, height_m)
+        pose = None
+        if tracks is not None:
+            seen_from_m = self._carried.at(now_ns, height_m, self._climbed.at(now_ns))
+            pose = self.localiser.step(tracks, seen_from_m)
         if pose is not None:
             self.poses.add(pose)
             for axis in (0, 1):
@@ -250,19 +258,30 @@ class StateEstimator:
         return Conditions(self._unleant, min(max(_FREE_S / total_s, _LEAST_EASE), 1.0))
 
     def _take_frame(self, lines: LineSet) -> None:
-        exposed_ns = self.tracker.exposed_ns(lines)
-        height_m, climbed_m = self._heights.at(exposed_ns), self._climbed.at(exposed_ns)
-        used, by_width_m = self.tracker.frame(lines, height_m, self._heights.error_m), self.tracker.by_width_m
-        if height_m < _CLIMB_DOUBT_M:
+        exposed_ns, carried = self.tracker.exposed_ns(lines), self._carried
+        measured_m, climbed_m = self._heights.at(exposed_ns), self._climbed.at(exposed_ns)
+        height_m = carried.at(exposed_ns, measured_m, climbed_m)
+        error_m = math.hypot(self._heights.error_m, carried.error_m(exposed_ns))
+        used, by_width_m = self.tracker.frame(lines, height_m, error_m), self.tracker.by_width_m
+        if used and by_width_m is not None:
+            carried.by_width(exposed_ns, by_width_m, climbed_m)
+        if measured_m < _CLIMB_DOUBT_M and not self.climb.found:
             self.climb.forget()
-        elif used and by_width_m is not None and math.isfinite(height_m + climbed_m):
-            self.climb.step(exposed_ns, height_m, by_width_m, climbed_m)
+        elif used and by_width_m is not None and math.isfinite(measured_m + climbed_m):
+            self.climb.step(exposed_ns, measured_m, by_width_m, climbed_m)
+            if self.climb.found:
+                carried.forget()
+
+    def _carry_height(self, stamp_ns: int) -> None:
+        if not self.climb.found:
+            self._carried.measured(stamp_ns, self._heights.at(stamp_ns), self._climbed.at(stamp_ns))
 
     def _count_climb(self, now_ns: int, climb_mps: float) -> None:
         """What the vehicle tells to have climbed; over a gap nothing is compared."""
         if math.isnan(climb_mps):
             self._climbed, self._climb_ns = HeightHistory(), 0
             self.climb.forget()
+            self._carried.forget()
             return
         dt_s = (now_ns - self._climb_ns) * 1e-9 if self._climb_ns else 0.0
         self._climbed_m, self._climb_ns = self._climbed_m + climb_mps * dt_s, now_ns
@@ -275,3 +294,4 @@ class StateEstimator:
             return
         if self._stuck.step(now_ns, vehicle.height_m, vehicle.climb_mps, commanded.climb_mps):
             self._heights = HeightHistory()
+            self._carried.forget()

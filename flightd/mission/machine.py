@@ -161,7 +161,14 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
     },
     Phase.TAKE_OFF: _UNDER_WAY
     | dict.fromkeys(
-        (Trigger.HEIGHT_WRONG, Trigger.CLOCK_UNSURE, Trigger.CAMERA_FROZEN, Trigger.FRAMES_STALE), Phase.LAND
+        (
+            Trigger.HEIGHT_WRONG,
+            Trigger.CLOCK_UNSURE,
+            Trigger.CAMERA_FROZEN,
+            Trigger.FRAMES_STALE,
+            Trigger.NO_LINES,
+        ),
+        Phase.LAND,
     )
     | {Trigger.AT_HEIGHT: Phase.ACQUIRE},
     Phase.ACQUIRE: _ON_LINES | {Trigger.ACQUIRED: Phase.TURN},

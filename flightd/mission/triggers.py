@@ -32,6 +32,7 @@ class Trigger(enum.Enum):
     RECORD_LOST = "the flight log cannot be written"
     HAZARD_LASTS = "held for too long"
     LINES_LOST_LONG = "lines lost for too long"
+    NO_LINES = "no line seen in the take-off"
     CUT_OFF = "no open line leads on from here"
     START_EXPIRED = "the start command is void"
     POSITION_UNKNOWN = "position not found again"

@@ -22,7 +22,7 @@ from flightd.core.geometry import Matrix
 from flightd.core.learnt import LearntSensors
 from flightd.core.tracks import SensorEstimate
 from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, placed
-from flightd.tracking.held_lines import HeldLine, associate
+from flightd.tracking.held_lines import SURE_HITS, HeldLine, associate, refound
 from flightd.tracking.innovations import Innovations
 from flightd.tracking.kalman import corrected, predicted
 from flightd.tracking.line_sight import FeatureSight, LineSight, Rates
@@ -70,11 +70,13 @@ _OUTLIER_SIGMAS = 3.0
 _FEATURES, _FRESH, _TELLING, _FEATURE_SIGMAS, _FEATURE_NS = 6, 3, 2, 4.0, 500_000_000
 """So many features are held across an axis, those seen last, since several detectors take turns; so many are
 followed from one frame, so many tell the motion; none that errs by more, or is not seen for so long."""
-_SURE_HITS, _GLIMPSE_NS = 3, 250_000_000
-"""A line seen less often is forgotten so soon: what only shows now and then is none."""
+_GLIMPSE_NS = 250_000_000
+"""A line seen less often than `SURE_HITS` is forgotten so soon: what only shows now and then is none."""
 _CARRIED_M = 0.12
 """A line whose place features of the floor have told this well is held on, however long it is not seen."""
 _SURVEY_SIGMAS = 4.0
+_SAME_LINE_M = 0.01
+"""Two tracks of one line differ by what its paint is skew."""
 _BETWEEN = 0.3
 """Share of what was thought possible by which a sensor can have changed between two flights."""
 
@@ -196,7 +198,7 @@ class FloorFilter:
 
     def tells(self, axis: int, lines: Sequence[int]) -> bool:
         """Whether one of these lines held is surely one, across the axis."""
-        return any(self.held[line].axis == axis and self.held[line].hits >= _SURE_HITS for line in lines)
+        return any(self.held[line].axis == axis and self.held[line].hits >= SURE_HITS for line in lines)
 
     def speeds(self, stamp_ns: int) -> tuple[float | None, float | None]:
         """Speed along each axis, None where no line seen in the frame of that time tells it."""
@@ -261,7 +263,11 @@ class FloorFilter:
         self._forget_features(stamp_ns)
         before = self._x[:FIRST_LINE].copy()
         known, fresh = associate(
-            sights, self.held, lambda sight, line: self._innovation(sight, line, rates), self._gate_m
+            sights,
+            self.held,
+            lambda sight, line: self._innovation(sight, line, rates),
+            self._gate_m,
+            stamp_ns,
         )
         bare = [axis for axis in range(2) if not self.tells(axis, [line for _, line in known])]
         followed, strange = self._followed([seen.across[axis] for axis in bare for seen in features], rates)
@@ -285,6 +291,7 @@ class FloorFilter:
             held.seen_ns, held.hits = stamp_ns, held.hits + 1
             held.width_m += 0.2 * (sight.width_m - held.width_m)
             held.from_m, held.to_m = sight.from_m, sight.to_m
+        self._refind([line for _, line in known], stamp_ns)
         for sight in fresh:
             self._add(sight, rates, stamp_ns, before)
         told_by = [sight.axis for sight, _ in followed]
@@ -304,22 +311,47 @@ class FloorFilter:
             (line, held) for line, held in enumerate(self.held) if held.axis == axis and held.id in places_m
         ]
         for line, held in known:
-            if held.surveyed or held.hits < _SURE_HITS:
+            if held.surveyed or held.hits < SURE_HITS:
                 continue
             others = [(at, other) for at, other in known if other.surveyed]
-            others = others or [(at, other) for at, other in known if at != line and other.hits >= _SURE_HITS]
+            others = others or [(at, other) for at, other in known if at != line and other.hits >= SURE_HITS]
             if not others:
                 continue
             at, other = min(others, key=lambda one: self.sigma(FIRST_LINE + one[0]))
             apart_m = places_m[held.id] - places_m[other.id]
-            row = np.zeros(len(self._x))
-            row[FIRST_LINE + line], row[FIRST_LINE + at] = 1.0, -1.0
+            row = self._between(line, at)
             off_m = float(row @ self._x) - apart_m
             spread_m = math.sqrt(float(row @ self._p @ row) + sigma_m**2)
             held.surveyed = other.surveyed = True
             if abs(off_m) < _SURVEY_SIGMAS * spread_m:
                 noise, errors = np.array([[sigma_m**2]]), np.array([off_m])
                 self._x, self._p, _ = corrected(self._x, self._p, row[None, :], errors, noise)
+
+    def _refind(self, seen: Sequence[int], stamp_ns: int) -> None:
+        """Take lines `seen` in this frame for those that were lost and should be there."""
+        pairs = refound(self.held, seen, self._apart, self._gate_m, stamp_ns)
+        for new, old in pairs:
+            self._join(old, new)
+        self._drop({new for new, _ in pairs})
+
+    def _apart(self, one: int, other: int) -> tuple[float, float]:
+        """How far one line held is beyond another one, and the standard deviation of that."""
+        row = self._between(one, other)
+        return float(row @ self._x), math.sqrt(max(float(row @ self._p @ row), 0.0))
+
+    def _between(self, one: int, other: int) -> Matrix:
+        row = np.zeros(len(self._x))
+        row[FIRST_LINE + one], row[FIRST_LINE + other] = 1.0, -1.0
+        return row
+
+    def _join(self, old: int, new: int) -> None:
+        """What was followed as two lines is one, and lies where the new one was seen."""
+        row = self._between(new, old)
+        errors, noise = np.array([float(row @ self._x)]), np.array([[_SAME_LINE_M**2]])
+        self._x, self._p, _ = corrected(self._x, self._p, row[None, :], errors, noise)
+        kept, found = self.held[old], self.held[new]
+        kept.seen_ns, kept.hits, kept.width_m = found.seen_ns, kept.hits + found.hits, found.width_m
+        kept.from_m, kept.to_m = found.from_m, found.to_m
 
     def _begin_anew(self, states: list[int]) -> None:
         """These are as unknown as at first, and nothing that is known says anything of them."""
@@ -465,7 +497,7 @@ class FloorFilter:
                 held.from_m = held.to_m = 0.0  # where it was in view is no longer known
             carried = stamp_ns - self._followed_ns[held.axis] <= _FEATURE_NS
             held_on = carried and self.offset(line)[1] < _CARRIED_M
-            glimpsed = held.hits < _SURE_HITS and unseen_ns > _GLIMPSE_NS
+            glimpsed = held.hits < SURE_HITS and unseen_ns > _GLIMPSE_NS
             if glimpsed or (unseen_ns > self._forget_ns and not held_on):
                 old.add(line)
         lines.sort(key=lambda line: -self.held[line].seen_ns)

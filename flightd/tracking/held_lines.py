@@ -10,6 +10,11 @@ from flightd.tracking.line_sight import LineSight
 _GATE_SIGMAS = 4.0
 _LEAST_SHARE = 0.3
 """Of the gate: so near a line is taken for one held however sure both are."""
+SURE_HITS = 3
+"""A line seen so often is surely one."""
+_LOST_NS = 250_000_000
+"""What is found where a line should be that was not seen for longer is taken for that once it is surely a
+line: a stain that shows for a frame would else tell where the drone is, and how fast."""
 
 
 @dataclass(slots=True)
@@ -28,16 +33,26 @@ class HeldLine:
     surveyed: bool = False
     """Its distance from another line was held against the map."""
 
+    def is_lost(self, stamp_ns: int) -> bool:
+        """It has not been seen lately: where it is now is what was dead-reckoned."""
+        return stamp_ns - self.seen_ns > _LOST_NS
+
+
+def reach_of(sigma_m: float, gate_m: float) -> float:
+    """How far from where it should be, known to `sigma_m`, a line is still taken for that."""
+    return min(max(_GATE_SIGMAS * sigma_m, _LEAST_SHARE * gate_m), gate_m)
+
 
 def associate(
     sights: Sequence[LineSight],
     held: Sequence[HeldLine],
     innovation: Callable[[LineSight, int], tuple[float, float]],
     gate_m: float,
+    stamp_ns: int,
 ) -> tuple[list[tuple[LineSight, int]], list[LineSight]]:
     """Each sight with the line held that it is, and those that are none; the surest sights choose first.
     `innovation` says of a sight and a line how far they are apart and the standard deviation of that;
-    `gate_m` is the farthest that is looked for."""
+    `gate_m` is the farthest that is looked for, `stamp_ns` the time of the sights."""
     known: list[tuple[LineSight, int]] = []
     fresh: list[LineSight] = []
     taken: set[int] = set()
@@ -47,7 +62,8 @@ def associate(
             if line in taken or one.axis != sight.axis or one.feature is not None:
                 continue
             apart_m, sigma_m = innovation(sight, line)
-            if abs(apart_m) < min(best_m, max(_GATE_SIGMAS * sigma_m, _LEAST_SHARE * gate_m)):
+            reach_m = _LEAST_SHARE * gate_m if one.is_lost(stamp_ns) else reach_of(sigma_m, gate_m)
+            if abs(apart_m) < min(best_m, reach_m):
                 best, best_m = line, abs(apart_m)
         if best is None:
             fresh.append(sight)
@@ -55,3 +71,30 @@ def associate(
             taken.add(best)
             known.append((sight, best))
     return known, fresh
+
+
+def refound(
+    held: Sequence[HeldLine],
+    seen: Sequence[int],
+    apart: Callable[[int, int], tuple[float, float]],
+    gate_m: float,
+    stamp_ns: int,
+) -> list[tuple[int, int]]:
+    """Which of the lines `seen` in the frame of that time have become sure with it and are where a line
+    should be that was lost: places of both in `held`, the new one first.  `apart` says of two lines how far
+    they are from each other, and the standard deviation of that."""
+    pairs: list[tuple[int, int]] = []
+    for new in seen:
+        if held[new].hits != SURE_HITS:
+            continue
+        best, least_m = None, gate_m
+        for old, line in enumerate(held):
+            lost = line.feature is None and line.axis == held[new].axis and line.is_lost(stamp_ns)
+            if not lost or line.hits < SURE_HITS or any(old == taken for _, taken in pairs):
+                continue
+            apart_m, sigma_m = apart(new, old)
+            if abs(apart_m) < min(least_m, reach_of(sigma_m, gate_m)):
+                best, least_m = old, abs(apart_m)
+        if best is not None:
+            pairs.append((new, best))
+    return pairs

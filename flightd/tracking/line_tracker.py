@@ -152,6 +152,11 @@ class LineTracker:
         return self._widths.off_m
 
     @property
+    def scale_share(self) -> float:
+        """By how much lengths on the floor are longer than height and focal length make them, as a share."""
+        return self._filter.mean(SCALE)
+
+    @property
     def by_width_m(self) -> float | None:
         """The height by the lines' width in the newest frame; None where they tell none."""
         return self._widths.by_width_m

@@ -22,7 +22,7 @@ from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Document, Topic
 from flightd.core.types import AttitudeSetpoint, Phase
 from flightd.replay.decision_compare import replay_decisions
-from flightd.replay.log import read_log
+from flightd.replay.log import Entry, read_log
 from flightd.site.site import Site
 from flightd.site.site_file import load_site, site_toml
 from tests.command import Command
@@ -30,6 +30,8 @@ from tests.replay.synthetic_flight import picture, seen_lines
 from tests.sim.ideal.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[2]
+_FOLLOWED = 100
+"""Decisions to follow a line, of a flight's beginning."""
 
 
 def _setting() -> tuple[Config, Site]:
@@ -62,6 +64,25 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def beginning(log: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of that flight what leads to its second second of following a line: for what one decision shows as
+    well as a thousand.  Nobody writes there."""
+    entries = read_log(log).entries
+    follows = [entry for entry in entries if _phase(entry) is Phase.FOLLOW]
+    path = tmp_path_factory.mktemp("beginning") / "flight.mcap"
+    with McapRecorder(path, when_full=wait_for_disk) as recorder:
+        for entry in entries:
+            if entry.stamp_ns <= follows[_FOLLOWED].stamp_ns:
+                recorder.record(entry.topic, entry.stamp_ns, entry.message)
+    return path
+
+
+def _phase(entry: Entry) -> Phase | None:
+    message: Any = entry.message
+    return Phase(message["phase"]) if entry.topic == Topic.DECISION else None
+
+
 def _step() -> Callable[[TickInput], TickOutput]:
     return pilot_of(*_setting()).step
 
@@ -73,7 +94,7 @@ def test_the_same_code_decides_the_same(log: Path) -> None:
     assert comparison.drifts == ()
 
 
-def test_a_small_change_of_behaviour_is_told_with_its_size(log: Path) -> None:
+def test_a_small_change_of_behaviour_is_told_with_its_size(beginning: Path) -> None:
     step = _step()
 
     def changed(tick: TickInput) -> TickOutput:
@@ -83,7 +104,7 @@ def test_a_small_change_of_behaviour_is_told_with_its_size(log: Path) -> None:
         more = dataclasses.replace(output.setpoint, roll_rad=output.setpoint.roll_rad + 0.001)
         return dataclasses.replace(output, setpoint=more)
 
-    comparison = replay_decisions(read_log(log), changed)
+    comparison = replay_decisions(read_log(beginning), changed)
     (drift,) = comparison.drifts
     assert drift.field == "setpoint.roll_rad"
     assert drift.largest == pytest.approx(0.001)
@@ -92,19 +113,19 @@ def test_a_small_change_of_behaviour_is_told_with_its_size(log: Path) -> None:
     assert comparison.within(0.0011)
 
 
-def test_a_decision_of_another_kind_is_beyond_any_tolerance(log: Path) -> None:
+def test_a_decision_of_another_kind_is_beyond_any_tolerance(beginning: Path) -> None:
     step = _step()
 
     def changed(tick: TickInput) -> TickOutput:
         return dataclasses.replace(step(tick), goal="Z9", setpoint=None)
 
-    comparison = replay_decisions(read_log(log), changed)
+    comparison = replay_decisions(read_log(beginning), changed)
     assert {drift.field for drift in comparison.drifts} == {"goal", "setpoint"}
     assert not comparison.within(1e9)
 
 
-def test_what_an_older_version_did_not_record_is_no_difference(log: Path) -> None:
-    recorded = read_log(log, {Topic.TICK, Topic.DECISION})
+def test_what_an_older_version_did_not_record_is_no_difference(beginning: Path) -> None:
+    recorded = read_log(beginning, {Topic.TICK, Topic.DECISION})
     messages: list[Any] = [entry.message for entry in recorded.entries if entry.topic == Topic.DECISION]
     sensors = [message["tracks"]["sensors"] for message in messages if message["tracks"] is not None]
     for one in sensors:
@@ -115,8 +136,8 @@ def test_what_an_older_version_did_not_record_is_no_difference(log: Path) -> Non
     assert not replay_decisions(recorded, _step()).identical
 
 
-def test_gaps_in_the_record_are_told(log: Path) -> None:
-    whole = read_log(log)
+def test_gaps_in_the_record_are_told(beginning: Path) -> None:
+    whole = read_log(beginning)
     lost = next(i for i, entry in enumerate(whole.entries) if entry.topic == Topic.DECISION and i > 400)
     holed = dataclasses.replace(whole, entries=whole.entries[:lost] + whole.entries[lost + 1 :])
     comparison = replay_decisions(holed, _step())
@@ -165,12 +186,12 @@ def test_the_command_tells_the_drift_of_another_configuration(
 
 
 def test_exit_code_line_and_complaint_judge_the_pictures_by_the_same_figures(
-    flightd: Command, log: Path, tmp_path: Path
+    flightd: Command, beginning: Path, tmp_path: Path
 ) -> None:
     """Every line was recorded a pixel beside where it is seen now."""
     path, rng, detector = tmp_path / "flight.mcap", np.random.default_rng(3), detector_of(*_setting())()
     with McapRecorder(path, when_full=wait_for_disk) as recorder:
-        for entry in read_log(log).entries:
+        for entry in read_log(beginning).entries:
             recorder.record(entry.topic, entry.stamp_ns, entry.message)
         for seq in range(1, 6):
             jpeg = picture(seen_lines(seq, seq, 0.0, rng), rng)
@@ -191,10 +212,12 @@ def test_exit_code_line_and_complaint_judge_the_pictures_by_the_same_figures(
     assert f"({told['pictures']['may_tip']} together allowed)" in strict.stdout
 
 
-def test_a_log_without_its_map_is_one_line_and_exit_2(flightd: Command, tmp_path: Path, log: Path) -> None:
+def test_a_log_without_its_map_is_one_line_and_exit_2(
+    flightd: Command, tmp_path: Path, beginning: Path
+) -> None:
     path = tmp_path / "flight.mcap"
     with McapRecorder(path, when_full=wait_for_disk) as recorder:
-        for entry in read_log(log, {Topic.CONFIG, Topic.TICK}).entries:
+        for entry in read_log(beginning, {Topic.CONFIG, Topic.TICK}).entries:
             recorder.record(entry.topic, entry.stamp_ns, entry.message)
     result = flightd("replay", path)
     assert (result.returncode, result.stdout) == (2, "")

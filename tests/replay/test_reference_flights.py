@@ -12,6 +12,7 @@ import pytest
 
 from flightd.core.topics import Document, Topic
 from flightd.replay.log import read_log
+from tests.command import Command
 from tools import update_reference_flights as tool
 
 FLIGHTS = sorted(tool.FOLDER.glob("*.mcap"))
@@ -27,10 +28,9 @@ def test_every_reference_is_there_and_small() -> None:
 
 
 @pytest.mark.parametrize("log", FLIGHTS, ids=lambda log: log.stem)
-def test_a_reference_flight_is_flown_as_it_was(log: Path) -> None:
+def test_a_reference_flight_is_flown_as_it_was(flightd: Command, log: Path) -> None:
     # on another processor the last digits may differ, nothing more
-    command = [sys.executable, "-m", "flightd", "replay", str(log), "--tolerance", "1e-6", "--json"]
-    result = subprocess.run(command, cwd=tool.ROOT, capture_output=True, text=True, check=False)
+    result = flightd("replay", log, "--tolerance", "1e-6", "--json")
     assert result.stdout, result.stderr
     told = json.loads(result.stdout)
     assert told["passed"], f"what drifts: {json.dumps(told['drift'], indent=1)}"

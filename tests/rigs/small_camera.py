@@ -1,5 +1,5 @@
 """The simulated camera at half of what a flight with it costs, for flights that prove something else than
-what a picture shows: fewer pixels, fewer pictures."""
+what a picture shows: fewer pixels, fewer pictures; and no waiting on the pad or at a node."""
 
 from __future__ import annotations
 
@@ -9,6 +9,14 @@ from typing import Final
 from flightd.sim.scenario.scenario import Scenario
 
 SMALL: Final[dict[str, float]] = {"width_px": 320, "height_px": 180, "fps": 20.0}
+
+AT_ONCE: Final = ("mission.autostart_countdown_s=0", "mission.dwell_s=0.5")
+"""Settings: the countdown and the dwell have tests of their own."""
+
+
+def at_once() -> list[str]:
+    """The same as words of a command."""
+    return [word for setting in AT_ONCE for word in ("--set", setting)]
 
 
 def with_small_camera(scenario: Scenario) -> Scenario:

@@ -79,3 +79,48 @@ def test_below_the_reserve_and_standing_still_are_faults() -> None:
     assert [fault.kind for fault in judge.faults] == ["below_reserve", "deadlock"]
     judge.end(1300.0, ["A1"])
     assert judge.count("unanswered") == 1
+
+
+def test_a_fleet_fills_its_batteries_at_shared_docks_alone_and_waits_for_them_at_home() -> None:
+    docked = replace(SMALL, drones=5, aisles=10, nodes=10, failing=0, closes_aisle=False, swaps=1)
+    simulation = FleetSimulation(docked)
+    filled: dict[str, int] = {}
+    charge = {drone.name: drone.charge for drone in simulation.world.drones.values()}
+    step = simulation.world.step
+
+    def watched(dt_s: float) -> None:
+        step(dt_s)
+        for drone in simulation.world.drones.values():
+            if drone.charge > charge[drone.name]:
+                filled[drone.name] = drone.place
+            charge[drone.name] = drone.charge
+
+    simulation.world.step = watched  # type: ignore[method-assign]
+    result = simulation.run()
+    assert result.judge.faults == []
+    assert result.counted == result.places
+    (dock,) = simulation.docks
+    assert len(filled) >= 3
+    assert set(filled.values()) == {dock.place}
+    document = result.document()
+    assert document["docks"][0]["kind"] == "swap"
+    assert document["docks"][0]["landings"] >= len(filled)
+    assert document["waited_for_docks_s"] > 0.0
+
+
+def test_who_lands_without_contact_says_so_lands_anew_and_takes_another_dock_in_the_end() -> None:
+    docked = replace(SMALL, aisles=10, nodes=10, failing=0, closes_aisle=False, contacts=2, misaligned=1.0)
+    result = fly_fleet(replace(docked, hours=0.6))
+    document = result.document()
+    assert {fault.kind for fault in result.judge.faults} <= {"deadlock"}, "nobody flies below its reserve"
+    assert all(dock["landings"] == dock["without_contact"] > 0 for dock in document["docks"])
+    first = document["docks_told"][0].split()[0]
+    of_first = [line.partition(" ")[2] for line in document["docks_told"] if line.startswith(f"{first} ")]
+    (one, other) = dict.fromkeys(line.split()[5].rstrip(":") for line in of_first if "contact" in line)
+    assert of_first[:4] == [
+        f"has no contact on dock {one}: it lands anew",
+        f"has no contact on dock {one}: it lands anew",
+        f"has no contact on dock {one} after 3 landings: it takes another",
+        f"has no contact on dock {other}: it lands anew",
+    ]
+    assert fly_fleet(replace(docked, misaligned=0.3)).good

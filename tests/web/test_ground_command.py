@@ -25,6 +25,7 @@ from flightd.ground.guards import own_hosts
 from flightd.ground.pages import STATIC
 from flightd.ground.server import Listening
 from flightd.site.site_file import load_site
+from tests.command import Command
 from tests.web.live_flight import LiveFlight
 
 ROOT = Path(__file__).parents[2]
@@ -42,16 +43,6 @@ PAGE = re.compile(r'styles: \[(?P<styles>[^]]*)\],\s*load: \(\) => import\("(?P<
 def _own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """People and audit of these stations are nobody else's."""
     monkeypatch.setenv("FLIGHTD_GROUND_STATE", str(tmp_path / "state"))
-
-
-def ground(*words: str) -> tuple[int, str]:
-    """Exit code and what is said, of a command that ends by itself."""
-    done = subprocess.run(
-        [sys.executable, "-m", "flightd", "ground", *words],
-        cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,
-    )  # fmt: skip
-    assert done.stdout == ""
-    return done.returncode, done.stderr
 
 
 @pytest.mark.parametrize(
@@ -73,9 +64,9 @@ def ground(*words: str) -> tuple[int, str]:
         (["--foxglove", "0.0.0.0"], "--foxglove 0.0.0.0: reaches beyond this machine, and Foxglove"),
     ],
 )  # fmt: skip
-def test_wrong_input_is_one_clear_line(words: list[str], said: str) -> None:
-    code, error = ground(*words)
-    assert code == 2
+def test_wrong_input_is_one_clear_line(flightd: Command, words: list[str], said: str) -> None:
+    code, out, error = flightd("ground", *words)
+    assert (code, out) == (2, "")
     assert error.startswith(f"flightd: {said}")
     assert error.count("\n") == 1
 
@@ -95,10 +86,10 @@ def test_without_foxgloves_package_one_line_says_how_to_get_it(tmp_path: Path) -
     assert done.stderr.count("\n") == 1
 
 
-def test_a_state_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_a_state_folder_that_cannot_be_written_is_named(flightd: Command, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    code, error = ground("--state", str(tmp_path / "file" / "state"), "--listen", "127.0.0.1:0")
-    assert (code, error.count("\n")) == (2, 1)
+    code, out, error = flightd("ground", "--state", tmp_path / "file" / "state", "--listen", "127.0.0.1:0")
+    assert (code, out, error.count("\n")) == (2, "", 1)
     assert "audit.jsonl: cannot be written: Not a directory; be the user" in error
 
 

@@ -18,7 +18,7 @@ from flightd.ground.flights.flights import Flights
 from flightd.ground.studio import studio as studio_module
 from flightd.ground.studio.lessons import Outcome
 from flightd.ground.studio.picture_sets import PictureSets
-from flightd.ground.studio.studio import Studio
+from flightd.ground.studio.studio import Studio, missing_training
 from flightd.ground.studio.verdict import Judged, Verdict
 from flightd.studies.train import train_colour
 from flightd.vision.lines.colour_profile import classify, grow, load_profile, save_profile
@@ -29,7 +29,7 @@ from tests.web.people_rig import audited, with_people
 from tests.web.served import JSON, Station, served
 from tests.web.studio_rig import flight_of, flown_folder, got, head_of, marked_set, marks_of, post, trained
 
-pytest.importorskip("sklearn", reason="training needs scikit-learn: pip install -e '.[train]'")
+pytestmark = pytest.mark.skipif(missing_training() != "", reason=missing_training())
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from flightd.ground.studio.profile_shelf import ProfileShelf
+from flightd.ground.studio.studio import missing_training
 from flightd.vision.lines.colour_profile import load_profile, save_profile
 from tests.web.camera_rig import CameraDrone
 from tests.web.chromium import NARROW, WIDE, hindrances, opened, station
@@ -19,9 +20,9 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 pytest.importorskip("playwright", reason="the tests of the page need playwright: pip install -e '.[dev]'")
-pytest.importorskip("sklearn", reason="training needs scikit-learn: pip install -e '.[train]'")
 from playwright.sync_api import expect
 
+pytestmark = pytest.mark.skipif(missing_training() != "", reason=missing_training())
 expect.set_options(timeout=40_000.0)
 
 LOOKS = [(NARROW, "light"), (WIDE, "dark")]

@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from flightd.fleet.traffic.distances import Distances
+from flightd.fleet.traffic.dock_queue import DockQueue, Standing
+from flightd.fleet.traffic.docks import Dock
+from flightd.fleet.traffic.endurance import Endurance
 from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action, Stop
 from flightd.fleet.traffic.traffic_control import TrafficControl
@@ -29,25 +32,10 @@ _SLOWER: Final = 1.15
 
 
 @dataclass(frozen=True, slots=True)
-class Endurance:
-    """`flight_s` in the air from full to empty, `charge_s` on a pad from empty to full; nobody flies below
-    the share `reserve`."""
-
-    flight_s: float = 1500.0
-    charge_s: float = 1800.0
-    reserve: float = 0.15
-    starts_at: float = 0.9
-
-    def left_ms(self, charge: float) -> int:
-        """In the air, down to the reserve."""
-        return int((charge - self.reserve) * self.flight_s * 1000)
-
-
-@dataclass(frozen=True, slots=True)
 class DroneReport:
     """What a drone tells: how many actions of its life are done, its charge, by how much its position is
     doubted, and whether it is unable to fly on; `not_counted` has the nodes at which a count failed, and
-    why."""
+    why.  `charging`: whether it is charged where it stands, None where it does not say."""
 
     drone: str
     done: int
@@ -55,6 +43,7 @@ class DroneReport:
     doubt_m: float = 0.0
     failed: bool = False
     not_counted: Mapping[str, str] = field(default_factory=dict)
+    charging: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,17 +55,26 @@ class Commands:
 
 
 class Dispatcher:
-    """The fleet of one floor.  With `shares` no drone is given more than its part of what waits, for all that
-    could fly now, and a step plans one tour at most: the next one follows soon."""
+    """The fleet of one floor.  Where there are `docks`, batteries are filled there alone.  With `shares` no
+    drone is given more than its part of what waits, for all that could fly now, and a step plans one tour at
+    most: the next one follows soon."""
 
     def __init__(
-        self, control: TrafficControl, queue: WorkQueue, endurance: Endurance, *, shares: bool = False
+        self,
+        control: TrafficControl,
+        queue: WorkQueue,
+        endurance: Endurance,
+        *,
+        shares: bool = False,
+        docks: Sequence[Dock] = (),
     ) -> None:
         self._shares = shares
         self.control = control
         self.queue = queue
         self._endurance = endurance
         self._distances = Distances(control.net)
+        self.docks = DockQueue(control, self._distances, docks, endurance.starts_at)
+        self._charging: dict[str, bool | None] = {}
         self._charge: dict[str, float] = {}
         self._tours: dict[str, set[str]] = {}
         self._waits_since_ms: dict[str, int] = {}
@@ -103,6 +101,7 @@ class Dispatcher:
             self._next_try_ms["urgent"] = now_ms + _RETRY_MS
             self._bring_home(now_ms)
         self._give_tours(now_ms)
+        self._fill_batteries(now_ms)
         return Commands(self.control.release(now_ms, self._comes_home), self.control.paused())
 
     def shut(self, aisle_nodes: Mapping[str, str], reason: str, now_ms: int) -> None:
@@ -188,7 +187,7 @@ class Dispatcher:
 
     def _hear(self, report: DroneReport, now_ms: int) -> None:
         drone, course = report.drone, self.control.drones[report.drone]
-        self._charge[drone] = report.charge
+        self._charge[drone], self._charging[drone] = report.charge, report.charging
         self._heard_ms[drone] = now_ms
         if drone in self._avoided and not course.failed:
             counts = [action.vertex for action in course.base if action.act is Act.COUNT]
@@ -271,7 +270,7 @@ class Dispatcher:
     def _is_short(self, drone: str) -> bool:
         """Whether it has to leave out what it has left to count to be home with its reserve."""
         course = self.control.drones[drone]
-        left_ms = self._endurance.left_ms(self._charge.get(drone, 1.0))
+        left_ms = self._left_ms(drone)
         at = course.base[-1].vertex if course.base else course.place
         if self.control.lanes.vertices[course.place].pad is not None:
             return False
@@ -287,7 +286,7 @@ class Dispatcher:
         for drone, actions in self.control.projected(now_ms).items():
             if actions:
                 flying.append(drone)
-                left_ms = self._endurance.left_ms(self._charge.get(drone, 1.0))
+                left_ms = self._left_ms(drone)
                 in_air = self.control.lanes.vertices[self.control.drones[drone].place].pad is None
                 short = left_ms < _SLOWER * (actions[-1].end_ms - now_ms) + _SPARE_MS
                 if in_air and short and self.control.drones[drone].stops:
@@ -303,7 +302,31 @@ class Dispatcher:
         if not course.stops:
             return True
         home_ms = min(self._distances.to(end)[vertex] for end in course.ends)
-        return _SLOWER * (after_ms + home_ms) <= self._endurance.left_ms(self._charge.get(drone, 1.0))
+        return _SLOWER * (after_ms + home_ms) <= self._left_ms(drone)
+
+    def _left_ms(self, drone: str) -> int:
+        """In the air, down to the reserve and the way to a dock."""
+        keep_ms = self.docks.keep_ms(drone)
+        spare_ms = int(_SLOWER * (1 + _SPARE_FRAC) * keep_ms) + _SPARE_MS if keep_ms else 0
+        return self._endurance.left_ms(self._charge.get(drone, 1.0)) - spare_ms
+
+    def _fill_batteries(self, now_ms: int) -> None:
+        """As long as there is something to count with them."""
+        if not self.docks.are_there or not (self.queue.open or self.queue.given):
+            return
+        known: dict[str, Standing] = {}
+        left_ms: dict[str, int] = {}
+        for drone, course in self.control.drones.items():
+            if (
+                drone in self._charge
+                and not course.failed
+                and course.doubt_m <= 0.0
+                and drone not in self._held
+            ):
+                known[drone] = Standing(self._charge[drone], self._charging[drone])
+                spared_ms = self._endurance.left_ms(self._charge[drone]) - _SPARE_MS
+                left_ms[drone] = int(spared_ms / (_SLOWER * (1 + _SPARE_FRAC)))
+        self.docks.step(now_ms, known, left_ms)
 
     def _replanned(self, drones: Sequence[str], now_ms: int) -> None:
         for drone in drones:
@@ -338,13 +361,14 @@ class Dispatcher:
         return idle and drone not in self._held and self._charge.get(drone, 0.0) >= self._endurance.starts_at
 
     def _give_tour(self, drone: str, now_ms: int, most: int) -> bool:
-        course = self.control.drones[drone]
-        left_ms = self._endurance.left_ms(self._charge[drone])
+        course, home = self.control.drones[drone], self.docks.home(drone)
+        left_ms = self._left_ms(drone)
         budget_ms = int(left_ms / (_SLOWER * (1 + _SPARE_FRAC)))
         busy = {self.queue.work(node).aisle for node in self.queue.given}
-        nodes = self.queue.tour(self._times(course.place, course.ends[0]), budget_ms, busy, most, drone)
+        nodes = self.queue.tour(self._times(course.place, home), budget_ms, busy, most, drone)
+        ends = (home,)
         while nodes:
-            if not self.control.give(drone, [self._stop(node) for node in nodes], course.ends, now_ms):
+            if not self.control.give(drone, [self._stop(node) for node in nodes], ends, now_ms):
                 self._refused(nodes)
                 nodes = nodes[: len(nodes) // 2]
                 continue
@@ -353,7 +377,7 @@ class Dispatcher:
                 self.queue.take(drone, nodes)
                 self._tours.setdefault(drone, set()).update(nodes)
                 return True
-            self.control.give(drone, (), course.ends, now_ms)
+            self.control.give(drone, (), ends, now_ms)
             nodes = nodes[: len(nodes) * 3 // 4]
         return False
 

@@ -81,7 +81,9 @@ class WorkQueue:
                 self._open[each.node] = None
 
     def finish(self, node: str) -> None:
-        """It is counted."""
+        """It is counted; nothing, of a node without work."""
+        if node not in self._work:
+            return
         self._given.pop(node, None)
         self._open.pop(node, None)
         self.reasons.pop(node, None)

@@ -13,7 +13,8 @@ from typing import Any, Final, Protocol, TypeAlias, TypeVar
 
 from flightd.core.errors import InputError
 from flightd.fleet.traffic.cells import CellSize
-from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport, Endurance
+from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
+from flightd.fleet.traffic.endurance import Endurance
 from flightd.fleet.traffic.plan import Action
 from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.traffic.work_queue import NodeWork, Value, WorkQueue

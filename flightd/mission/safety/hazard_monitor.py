@@ -30,6 +30,9 @@ _CLIMBS_UNSEEING_S = 1.0
 """So long a take-off, which hardly steers, goes on without a picture, or with the same one."""
 _OFF_FLOOR_M = 0.5
 """Below, a picture may well stay the same: of the pad itself, packed so that its noise is gone."""
+_RISES_UNSEEING_M, _RISES_UNSEEING_SHARE = 1.0, 0.65
+"""So high, or so far up to its flying height, goes a take-off that has not seen any line of the map: nothing
+steers it, and it drifts by the square of the time."""
 _JUMPED = 2
 """So many attitudes with a senseless time are no stray datagram."""
 
@@ -189,8 +192,15 @@ class HazardMonitor:
         elif lost and self._unseen_ns is None:
             self._unseen_ns = s.now_ns
         self.unseen_s = 0.0 if self._unseen_ns is None else (s.now_ns - self._unseen_ns) * 1e-9
+        if situation.takes_off and self._rises_unseeing(s):
+            return {Trigger.NO_LINES}
         if lost and (self.unseen_s > p.lines_land_s or self.blind.too_long):
             return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}
         if lost:
             return {Trigger.LINES_LOST}
         return {Trigger.LINES_FOUND} if seen_s > p.lines_hold_s and not situation.paused else set()
+
+    def _rises_unseeing(self, s: MissionInputs) -> bool:
+        """No line was seen from the pad, nor its mat, though the picture is wide enough by now."""
+        seen = min(s.x_age_s, s.y_age_s) < math.inf or s.by_pad
+        return not seen and s.height_m > min(_RISES_UNSEEING_M, _RISES_UNSEEING_SHARE * self._params.height_m)

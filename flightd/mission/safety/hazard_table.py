@@ -160,7 +160,8 @@ HAZARDS: tuple[Hazard, ...] = (
         "height_wrong",
         Trigger.HEIGHT_WRONG,
         "width of the seen lines against the map's by more than `hazards.height_share`, or by 0.25 m and"
-        " 12 %, for `hazards.disagree_s`; from the floor on, too",
+        " 12 %, or by 8.5 % where their distances and the drone's motion tell the same, for"
+        " `hazards.disagree_s`; from the floor on, too",
         Action.HOLD,
         "no climb by it; land after `mission.lines_land_s`",
         _FAST,
@@ -274,11 +275,11 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.LINES_LOST,
         "no line of the map newer than `mission.lines_hold_s`, the followed one older than 0.8 s, and no"
         " features of the floor that carry the position on (`localisation.expert.by_features_m`), or the"
-        " position too uncertain",
+        " position too uncertain; in a take-off no line and no mat seen from a metre up",
         Action.HOLD,
         "brake by dead reckoning, hold; after `hazards.expert.search_s` climb by"
         " `hazards.expert.search_climb_m` to see more; land after `hazards.expert.search_land_s`, or with"
-        " glimpses after `mission.lines_land_s`",
+        " glimpses after `mission.lines_land_s`; a take-off lands",
         _FAST,
     ),
     Hazard(

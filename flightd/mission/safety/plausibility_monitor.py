@@ -21,6 +21,10 @@ _FRESH_NS = 250_000_000
 _OFF_M, _OFF_SHARE = 0.25, 0.12
 """A height is wrong, too, that is off by so much and by so great a share: the wrong height above what was
 commanded has to stay within half a metre, whatever is flown at."""
+_BOTH_SHARE, _SCALE_SHARE = 0.085, 0.065
+"""It is wrong, too, where width and scale are both off by more: lengths on the floor do not come out as the
+map and the motion have them.  A focal length alone errs by less (`SensorPriors.scale_share`); a creep that
+swings of a stuck reading hide shows in both."""
 _KNOWN_M = 0.3
 """A position less certain than this (standard deviation) cannot tell whether the corridor is left."""
 
@@ -60,6 +64,7 @@ class PlausibilityMonitor:
         self._tick_s += min(dt_s / _TICK_MEMORY_S, 1.0) * (dt_s - self._tick_s)
         off_share, off_m = abs(tracker.height_share - 1.0), abs(tracker.height_off_m)
         is_off = off_share > self._height_share or (off_m > _OFF_M and off_share > _OFF_SHARE)
+        is_off = is_off or _both_off(1.0 - tracker.height_share, tracker.scale_share)
         highest_m = max(height_m, height_m - tracker.height_off_m)  # one that sticks near the floor is low
         self._doubt = is_off and highest_m > self._judged_above_m
         if tracks is not None and now_ns - max(tracks.lines_ns, min(tracks.features_ns)) < _FRESH_NS:
@@ -126,6 +131,12 @@ class PlausibilityMonitor:
         return by_line and (
             math.isinf(area.distance_m) or _across_sigma_m(pose, (area.x_m, area.y_m)) < _KNOWN_M
         )
+
+
+def _both_off(by_width: float, by_scale: float) -> bool:
+    """Both say that the height is told too small, or both that it is too great, as shares of it."""
+    agree = by_width * by_scale > 0.0
+    return agree and abs(by_width) > _BOTH_SHARE and abs(by_scale) > _SCALE_SHARE
 
 
 def _across_sigma_m(pose: GridPose, line_m: tuple[float, float]) -> float:

@@ -12,7 +12,7 @@ import math
 from flightd.config.schema import Config
 from flightd.mission.guidance import MissionInputs
 
-_FLARE_PER_S, _STAND_M = 2.0, 0.10
+_FLARE_PER_S, _STAND_M = 2.5, 0.10
 """A blind descent slows down towards the floor: its rate over the height of the skids."""
 
 

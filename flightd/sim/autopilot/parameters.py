@@ -44,7 +44,7 @@ COPTER_PARAMETERS: dict[str, float] = {
     "GUID_TIMEOUT": 0.3,
     "WPNAV_SPEED_UP": 250,
     "WPNAV_SPEED_DN": 150,
-    "LAND_SPEED": 100,
+    "LAND_SPEED": 90,
     "ANGLE_MAX": 3000,
     "MOT_THST_HOVER": 0.34,
 }

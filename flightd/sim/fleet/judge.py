@@ -57,7 +57,7 @@ class FleetJudge:
             if not drone.failed and drone.charge < self._reserve and drone.name not in self._below:
                 self._below.add(drone.name)
                 self.faults.append(FleetFault("below_reserve", at_s, (drone.name,), drone.charge))
-        busy = any(d.speed_mps > 0.0 or d.timer_s > 0.0 or (d.charge < 1.0 and not d.base) for d in drones)
+        busy = any(d.speed_mps > 0.0 or d.timer_s > 0.0 or (d.charging and d.charge < 1.0) for d in drones)
         if busy or not work_left:
             self._moved_s, self._stuck = at_s, False
         elif at_s - self._moved_s > STANDSTILL_S and not self._stuck:

@@ -9,7 +9,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from flightd.fleet.traffic.cells import CellSize
-from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport, Endurance
+from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
+from flightd.fleet.traffic.dock_queue import docks_of
+from flightd.fleet.traffic.docks import Dock
+from flightd.fleet.traffic.endurance import Endurance
 from flightd.fleet.traffic.lanes import LaneGraph, lanes_of
 from flightd.fleet.traffic.plan import Action
 from flightd.fleet.traffic.traffic_control import TrafficControl
@@ -43,7 +46,8 @@ _HUB_STEPS: Final = 2
 class FleetScenario:
     """What is flown.  `failing` drones fail between shelves after they counted for a time within `fails_s`,
     each after a while of its own; one aisle is closed from `closed_from` to `closed_to`, shares of the
-    hours."""
+    hours.  Of the docks, if there are any, `swaps` swap a battery in `swap_s`, and `contacts` charge it; a
+    share `misaligned` of the landings on these finds no contact."""
 
     drones: int = 10
     aisles: int = 40
@@ -55,6 +59,10 @@ class FleetScenario:
     closed_from: float = 0.05
     closed_to: float = 0.15
     closes_aisle: bool = True
+    swaps: int = 0
+    contacts: int = 0
+    swap_s: float = 90.0
+    misaligned: float = 0.1
     unknowns: Unknowns = field(default_factory=Unknowns)
     endurance: Endurance = field(default_factory=Endurance)
     cell: CellSize = field(default_factory=CellSize)
@@ -74,6 +82,7 @@ class FleetResult:
     least_charge: float
     failed: tuple[str, ...]
     replans: int
+    docks: Mapping[str, Any]
 
     @property
     def good(self) -> bool:
@@ -108,6 +117,7 @@ class FleetResult:
             "least_charge": round(self.least_charge, 3),
             "failed": list(self.failed),
             "replans": self.replans,
+            **self.docks,
             "faults": [fault_document(fault) for fault in judge.faults],
         }
 
@@ -131,16 +141,26 @@ class FleetSimulation:
 
     def __init__(self, scenario: FleetScenario, site: Site | None = None) -> None:
         self.scenario = scenario
-        self.site = site or fleet_hall(scenario.aisles, scenario.nodes, scenario.drones)
+        pads = scenario.drones + scenario.swaps + scenario.contacts
+        self.site = site or fleet_hall(scenario.aisles, scenario.nodes, pads)
         self.lanes: LaneGraph = lanes_of(self.site)
         e = scenario.endurance
-        self.world = FleetWorld(self.lanes, PACE, scenario.unknowns, 1 / e.flight_s, 1 / e.charge_s)
+        homes, self.docks = shared_out(self.lanes, scenario)
+        self.world = FleetWorld(
+            self.lanes,
+            PACE,
+            scenario.unknowns,
+            1 / e.flight_s,
+            1 / e.charge_s,
+            self.docks,
+            scenario.misaligned,
+        )
         self.control = TrafficControl(self.lanes, PACE, scenario.cell)
         self.queue = WorkQueue(work_of(self.site))
-        self.dispatcher = Dispatcher(self.control, self.queue, e)
+        self.dispatcher = Dispatcher(self.control, self.queue, e, docks=self.docks)
         self.judge = FleetJudge(scenario.cell, e.reserve)
         rng = random.Random(f"fleet {scenario.seed}")
-        for i, pad in enumerate(self.lanes.pads[: scenario.drones], start=1):
+        for i, pad in enumerate(homes, start=1):
             drone = self.world.add(f"drone-{i}", pad, f"{scenario.seed} {i}")
             self.control.enter(drone.name, pad)
         for name in rng.sample(sorted(self.world.drones), min(scenario.failing, scenario.drones)):
@@ -187,7 +207,10 @@ class FleetSimulation:
     def _hub(self, now_ms: int) -> None:
         linked = [drone for drone in self.world.drones.values() if drone.cut_s <= 0.0]
         reports = [
-            DroneReport(drone.name, drone.done, drone.charge, drone.doubt_m, drone.failed) for drone in linked
+            DroneReport(
+                drone.name, drone.done, drone.charge, drone.doubt_m, drone.failed, charging=drone.charging
+            )
+            for drone in linked
         ]
         commands = self.dispatcher.step(now_ms, reports)
         for name, drone in self.world.drones.items():
@@ -222,10 +245,41 @@ class FleetSimulation:
             min((drone.least_charge for drone in drones if not drone.failed), default=1.0),
             tuple(drone.name for drone in drones if drone.failed),
             self.control.replans,
+            self._docks_document(),
         )
+
+    def _docks_document(self) -> dict[str, Any]:
+        """What came of the docks; empty without any."""
+        if not self.docks:
+            return {}
+        landings = {dock.name: self.world.landings.get(dock.name, (0, 0)) for dock in self.docks}
+        return {
+            "docks": [
+                {
+                    "dock": dock.name,
+                    "kind": dock.kind.value,
+                    "landings": landings[dock.name][0],
+                    "without_contact": landings[dock.name][1],
+                }
+                for dock in self.docks
+            ],
+            "waited_for_docks_s": round(self.dispatcher.docks.waited_ms / 1000, 1),
+            "docks_told_count": self.dispatcher.docks.told_count,
+            "docks_told": list(self.dispatcher.docks.told),
+        }
 
     def _nodes(self) -> list[str]:
         return [work.node for work in work_of(self.site)]
+
+
+def shared_out(lanes: LaneGraph, scenario: FleetScenario) -> tuple[list[int], tuple[Dock, ...]]:
+    """The drones' own pads, and the docks, spread evenly among them."""
+    pads, count = list(lanes.pads), scenario.swaps + scenario.contacts
+    total = scenario.drones + count
+    at = {(2 * i + 1) * total // (2 * count) for i in range(count)}
+    docks = [(lanes.vertices[pads[i]].pad or "", pads[i]) for i in sorted(at)]
+    homes = [pad for i, pad in enumerate(pads[:total]) if i not in at]
+    return homes, docks_of(docks, scenario.swaps, scenario.swap_s, scenario.endurance.charge_s)
 
 
 def fly_fleet(scenario: FleetScenario) -> FleetResult:

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from flightd.fleet.traffic.docks import Dock, DockKind
 from flightd.fleet.traffic.lanes import LaneGraph
 from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action
@@ -61,6 +62,9 @@ class FleetDrone:
     paused: bool = False
     failed: bool = False
     fails_after_s: float = math.inf
+    charging: bool = False
+    contact: bool = False
+    swap_left_s: float = 0.0
     in_aisle_s: float = 0.0
     error_m: tuple[float, float] = (0.0, 0.0)
     x_m: float = 0.0
@@ -72,7 +76,9 @@ class FleetDrone:
 
 class FleetWorld:
     """Steps all drones; `draw_frac_per_s` of a battery is drawn in the air, `charge_frac_per_s` comes back
-    on a pad."""
+    on a pad.  Where there are `docks`, it comes back there alone, as each of them fills it; a share
+    `misaligned` of landings on one with contacts finds none.  `landings` counts those on each, and those that
+    found none."""
 
     def __init__(
         self,
@@ -81,12 +87,17 @@ class FleetWorld:
         unknowns: Unknowns,
         draw_frac_per_s: float,
         charge_frac_per_s: float,
+        docks: Iterable[Dock] = (),
+        misaligned: float = 0.0,
     ) -> None:
         self._lanes = lanes
         self._pace = pace
         self._unknowns = unknowns
         self._draw = draw_frac_per_s
         self._fill = charge_frac_per_s
+        self._docks = {dock.place: dock for dock in docks}
+        self._misaligned = misaligned
+        self.landings: dict[str, tuple[int, int]] = {}
         self.drones: dict[str, FleetDrone] = {}
 
     def add(self, name: str, place: int, seed: str) -> FleetDrone:
@@ -115,9 +126,10 @@ class FleetWorld:
             drone.z_m = max(drone.z_m - _LAND_MPS * dt_s, 0.0)
             return
         if not self.flies(drone):
-            drone.charge = min(drone.charge + self._fill * dt_s, 1.0)
+            self._stand(drone, dt_s)
             drone.cut_s = max(drone.cut_s - dt_s, 0.0)
             return
+        drone.charging = False
         drone.charge -= self._draw * dt_s
         drone.flown_s += dt_s
         drone.least_charge = min(drone.least_charge, drone.charge)
@@ -125,6 +137,28 @@ class FleetWorld:
         if not drone.failed:
             self._move(drone, dt_s)
         self._locate(drone)
+
+    def _stand(self, drone: FleetDrone, dt_s: float) -> None:
+        """On a pad, which it sees: nobody there is in doubt where it is."""
+        drone.doubt_s = drone.doubt_m = 0.0
+        dock = self._docks.get(drone.place)
+        if dock is None:
+            drone.charging = not self._docks
+            fill = self._fill if drone.charging else 0.0
+            drone.charge = min(drone.charge + fill * dt_s, 1.0)
+        elif dock.kind is DockKind.CONTACT:
+            drone.charging = drone.contact
+            drone.charge = min(drone.charge + (dt_s / dock.full_s if drone.contact else 0.0), 1.0)
+        else:
+            drone.charging = True
+            drone.swap_left_s -= dt_s
+            drone.charge = drone.charge if drone.swap_left_s > 0.0 else 1.0
+
+    def _land(self, drone: FleetDrone, dock: Dock) -> None:
+        drone.contact = dock.kind is DockKind.SWAP or drone.rng.random() >= self._misaligned
+        drone.swap_left_s = dock.full_s
+        landings, missed = self.landings.get(dock.name, (0, 0))
+        self.landings[dock.name] = landings + 1, missed + (not drone.contact)
 
     def _trouble(self, drone: FleetDrone, dt_s: float) -> None:
         u, rng = self._unknowns, drone.rng
@@ -218,6 +252,8 @@ class FleetWorld:
         drone.place = action.vertex
         drone.done += 1
         drone.timer_s = 0.0
+        if dock := self._docks.get(drone.place):
+            self._land(drone, dock)
         if not keeps:
             drone.along_m = drone.speed_mps = 0.0
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from flightd.cli.main import app
-from tests.rigs.small_camera import small_camera_file
+from tests.rigs.small_camera import at_once, small_camera_file
 
 BARE = """
 [[fault]]
@@ -23,7 +23,7 @@ def test_three_metres_without_paint_are_flown_over(tmp_path: Path) -> None:
     extra.write_text(BARE)
     small = str(small_camera_file(tmp_path))
     options = ["--scenario", str(extra), "--scenario", small, "--out", str(out), "--json", "--seed", "5104"]
-    result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2","A4"]'])
+    result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2","A4"]', *at_once()])
     summary = json.loads((out / "summary.json").read_text())
     assert summary["mission"] == "completed", summary
     assert result.exit_code == 0, result.output

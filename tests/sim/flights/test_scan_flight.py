@@ -13,7 +13,7 @@ import pytest
 
 from flightd.adapters.store.sqlite import SqliteStore
 from tests.command import Command
-from tests.rigs.small_camera import small_camera_file
+from tests.rigs.small_camera import at_once, small_camera_file
 
 ROOT = Path(__file__).parents[3]
 
@@ -24,7 +24,11 @@ pytestmark = pytest.mark.slow
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("scan")
     where = ("--warehouse", str(ROOT / "configs" / "site-racks-small.toml"), "--set", 'mission.nodes=["A2"]')
-    small = ("--scenario", str(small_camera_file(out)))  # below; the front camera is as it is shipped
+    small = (
+        "--scenario",
+        str(small_camera_file(out)),
+        *at_once(),
+    )
     command = [sys.executable, "-m", "flightd", "sim", *where, *small, "--seed", "3", "--out", str(out)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=290, check=False)
     assert done.returncode == 0, done.stderr

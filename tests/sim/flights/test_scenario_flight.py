@@ -13,7 +13,7 @@ from flightd.cli.main import app
 from flightd.core.topics import Topic
 from flightd.core.types import Event
 from flightd.replay.log import read_log
-from tests.rigs.small_camera import small_camera_file
+from tests.rigs.small_camera import at_once, small_camera_file
 
 FAULTS = """
 [[fault]]
@@ -33,7 +33,7 @@ def test_two_faults_in_one_flight_are_done_found_and_answered(tmp_path: Path) ->
     out = tmp_path / "out"
     small = str(small_camera_file(tmp_path))
     options = ["--scenario", str(extra), "--scenario", small, "--out", str(out), "--json"]
-    result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2"]'])
+    result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2"]', *at_once()])
     assert result.exit_code != 0  # a flight that had to land is no completed mission
     summary = json.loads((out / "summary.json").read_text())
     assert summary["mission"] == "aborted"

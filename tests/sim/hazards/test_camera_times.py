@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from flightd.cli.main import app
 from flightd.core.types import Event, LineSet
 from flightd.replay.log import read_log
-from tests.rigs.small_camera import small_camera_file
+from tests.rigs.small_camera import at_once, small_camera_file
 
 FPS = 30.0
 JITTER_S = 0.003
@@ -21,7 +21,7 @@ JITTER_S = 0.003
 def test_frames_behind_newer_ones_are_refused_and_move_no_other(tmp_path: Path) -> None:
     small, out = small_camera_file(tmp_path, fps=FPS), tmp_path / "out"
     options = ["--scenario", "frames_disordered", "--scenario", str(small), "--out", str(out), "--json"]
-    result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2"]'])
+    result = CliRunner().invoke(app, ["sim", *options, "--set", 'mission.nodes=["A2"]', *at_once()])
     summary = json.loads((out / "summary.json").read_text())
     assert result.exit_code == 0, result.output
     assert summary["mission"] == "completed"

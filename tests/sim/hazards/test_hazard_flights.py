@@ -12,7 +12,7 @@ from flightd.app.simulation.launch import fly
 from flightd.app.simulation.prepare import SimOptions, prepare
 from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
 from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
-from tests.rigs.small_camera import with_small_camera
+from tests.rigs.small_camera import AT_ONCE, with_small_camera
 
 ARDUPILOT = ("height_lost", "camera_gone")
 PX4 = ("height_stuck", "climb_lost", "ceiling_left")
@@ -26,8 +26,7 @@ PX4 = ("height_stuck", "climb_lost", "ceiling_left")
 )
 def test_it_is_found_and_ends_as_the_table_says(vehicle: str, hazard: str, tmp_path: Path) -> None:
     scenario = load_scenario(shipped_scenarios()[hazard])
-    at_once = ("mission.autostart_countdown_s=0",)
-    options = SimOptions(seed=1 + len(hazard), vehicle=vehicle, settings=at_once)
+    options = SimOptions(seed=1 + len(hazard), vehicle=vehicle, settings=AT_ONCE)
     simulation = prepare(
         options,
         with_small_camera(scenario),

@@ -38,7 +38,7 @@ from flightd.runtime.clock import LoopClock
 from tests.rigs.event_loops import virtual
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_ports import HeldSetpoint, IdealGround, IdealVehicle, IdealVision
-from tests.sim.ideal.test_ideal_scan import CONFIG, scan_flight
+from tests.sim.ideal.test_ideal_scan import CONFIG, ONE_SIDED, scan_flight
 from tests.unit.mission.shelves import SITE
 
 PACKAGE = str(Path(flightd.__file__).parent)
@@ -74,6 +74,7 @@ def fail_now(*_args: Any, **_kwargs: Any) -> None:
 def breaking(code: CodeType) -> Callable[[Callable[[], None]], AbstractContextManager[None]]:
     """What makes all functions of this code call something else meanwhile.  Those that use variables of the
     function around them cannot be changed: they are watched, which costs a flight three times as long."""
+    gc.unfreeze()  # what stood before the tests began is looked through too
     functions = [one for one in gc.get_referrers(code) if isinstance(one, FunctionType)]
 
     @contextmanager
@@ -228,7 +229,7 @@ class Broken:
 
 def test_whoever_fails_at_being_told_ends_no_flight_and_is_named_once() -> None:
     display, kept = Broken(), list[tuple[str, Any]]()
-    flight = scan_flight(("A2",), observers=[display])
+    flight = scan_flight(("A2",), site=ONE_SIDED, observers=[display])
     flight.on_record = lambda topic, _stamp_ns, message: kept.append((topic, message))
     assert flight.fly(120.0).phase is Phase.DONE
     assert display.told > 100

@@ -20,7 +20,7 @@ from flightd.replay.log import read_log
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.sensors.instruments import SensorParams
 from tests.rigs.event_loops import virtual
-from tests.rigs.small_camera import small_camera_file
+from tests.rigs.small_camera import at_once, small_camera_file
 from tests.rigs.vehicles import ardupilot_rig, px4_rig
 
 _STEP_S = 0.02
@@ -133,7 +133,7 @@ def test_a_whole_flight_whose_climb_rate_sticks_from_the_floor_on_stays_below_it
     scenario.write_text('[[fault]]\nkind = "climb_stuck"\nat_s = 0.0\n')
     seen = ["--scenario", str(scenario), "--scenario", str(small_camera_file(tmp_path))]
     options = [*seen, "--vehicle", "px4", "--out", str(tmp_path / "out"), "--json"]
-    result = CliRunner().invoke(app, ["sim", *options, "--set", "mission.nodes=A2"])
+    result = CliRunner().invoke(app, ["sim", *options, "--set", "mission.nodes=A2", *at_once()])
     assert result.exit_code == 1
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["mission"] == "aborted"

@@ -16,7 +16,7 @@ from flightd.site.site_file import load_site
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight, rms_off_line
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-CONFIG = load_config(CONFIGS / "sim.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"dwell_s": 0.5})
 DEMO = load_site(CONFIGS / "site-demo.toml")
 NEAR = ("A1", "A2", "A3")
 WHOLE = DEMO.serpentine_route()

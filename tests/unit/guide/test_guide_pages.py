@@ -26,6 +26,7 @@ from flightd.runtime.frame_notice import decode_notice, encode_notice
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.scenario import Scenario
 from flightd.site.site_file import parse_site
+from tools.odoo.connector_file import ConnectorFile
 from tools.write_guide import ROOT, guide_files, stale
 
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -87,6 +88,8 @@ def test_a_block_of_toml_is_what_its_program_takes(name: str, text: str, tmp_pat
         parse_site(text, name)
     elif name == "simulation.md":
         Scenario.model_validate(table)
+    elif "odoo" in table:
+        ConnectorFile.model_validate(table)
     elif name == "store.md":
         ExchangeFile.model_validate(table)
     else:

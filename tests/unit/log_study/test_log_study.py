@@ -117,11 +117,10 @@ def test_a_worker_that_dies_costs_time_alone(flights: Path, tmp_path: Path, work
 
 def test_ray_finds_the_same_byte_for_byte_though_a_worker_is_killed(flights: Path, tmp_path: Path) -> None:
     pytest.importorskip("ray", reason="the tests of --engine ray need it: pip install -e '.[ray]'")
-    for number in range(2):
-        shutil.copytree(flights, tmp_path / "flights" / str(number))
+    shutil.copytree(flights, tmp_path / "flights")
     sources = log_sources([str(tmp_path / "flights")])
     right = serial(sources)
-    (tmp_path / "flights" / "1" / "b" / "dies once").touch()
+    (tmp_path / "flights" / "b" / "dies once").touch()
     assert told(sources, run_ray(sources, STUDIES, 2, dies_once)) == right
 
 

@@ -311,6 +311,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.RECORD_LOST: sick(recorder_error="disk full"),
     Trigger.HAZARD_LASTS: warned(1.3, frozen_s=9.0),
     Trigger.LINES_LOST_LONG: sensed(2.5, x_age_s=9.0, y_age_s=9.0),
+    Trigger.NO_LINES: sensed(x_age_s=math.inf, y_age_s=math.inf, height_m=1.1),
     Trigger.CUT_OFF: placed(node="beyond the barrier"),
     Trigger.POSITION_UNKNOWN: Stimulus(_idle, 3.3),
     Trigger.TIMED_OUT: Stimulus(_stuck, 70.0, params=_PATIENT),

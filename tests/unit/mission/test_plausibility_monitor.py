@@ -6,9 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from flightd.core.types import GridPose
+from flightd.core.geometry import Lens, Mount
+from flightd.core.types import HEALTHY, GridPose
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from flightd.site.site_file import load_site
+from flightd.tracking.frame_monitor import FrameMonitor
+from flightd.tracking.line_tracker import LineTracker
 from tests.unit.mission.configured import configured
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
@@ -29,3 +32,43 @@ def test_back_where_it_is_outside_and_knows_it(y_m: float, sigma_m: float, leads
     assert (back is not None) is leads_back
     if back is not None:
         assert back == pytest.approx((0.0, -1.0))
+
+
+@pytest.mark.parametrize(
+    ("told_share", "scale", "doubted"),
+    [
+        (0.9, 0.08, True),  # it creeps up by a reading that swings, and the scale bends along
+        (1.1, -0.08, True),
+        (0.9, -0.08, False),
+        (0.9, 0.04, False),  # as far as a focal length may be off
+        (0.96, 0.08, False),
+        (0.8, 0.0, True),  # a quarter of a metre and 12 %
+    ],
+)
+def test_a_height_that_width_and_scale_both_contradict_is_doubted(
+    told_share: float, scale: float, doubted: bool
+) -> None:
+    tracker, told_m = _Seen(told_share, scale), 1.5
+    monitor = PlausibilityMonitor(SITE, configured())
+    warnings = monitor.step(0, 0.02, None, told_m, None, tracker, FrameMonitor(), HEALTHY)
+    assert warnings.height_doubted is doubted
+
+
+class _Seen(LineTracker):
+    """What lines and motion say of the told height."""
+
+    def __init__(self, told_share: float, scale: float) -> None:
+        super().__init__(Lens(640, 360, 320.0, 320.0, 320.0, 180.0), Mount(), 0.075, 0.0)
+        self._told_share, self._scale = told_share, scale
+
+    @property
+    def height_share(self) -> float:
+        return self._told_share
+
+    @property
+    def height_off_m(self) -> float:
+        return 1.5 - 1.5 / self._told_share
+
+    @property
+    def scale_share(self) -> float:
+        return self._scale

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from flightd.app.service import note_start, was_started_before
+from tests.command import Command
 
 SYSTEMD = Path(__file__).parents[3] / "systemd"
 UNIT = SYSTEMD / "flightd.service"
@@ -50,18 +51,15 @@ def test_the_units_mark_is_the_daemons() -> None:
     assert "test -e /run/flightd/started ||" in text
 
 
-def doctor(*words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "flightd", "doctor", "--quick", *words]
-    return subprocess.run(command, cwd=SYSTEMD.parent, capture_output=True, text=True, check=False)
-
-
-def test_the_quick_doctor_needs_neither_camera_nor_vehicle(tmp_path: Path) -> None:
-    found = json.loads(doctor("--config", "configs/sim.toml", "--json").stdout)
+def test_the_quick_doctor_needs_neither_camera_nor_vehicle(flightd: Command, tmp_path: Path) -> None:
+    found = json.loads(
+        flightd("doctor", "--quick", "--config", SYSTEMD.parent / "configs" / "sim.toml", "--json").stdout
+    )
     assert "config" in {check["name"] for check in found["checks"]}
     assert {"camera", "vehicle"}.isdisjoint(check["name"] for check in found["checks"])
     broken = tmp_path / "flightd.toml"
     broken.write_text("[mission]\nsite = 1\n")
-    refused = doctor("--config", str(broken))
+    refused = flightd("doctor", "--quick", "--config", broken)
     assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
     assert "mission.site" in refused.stderr
 

@@ -257,3 +257,55 @@ def test_what_only_shows_now_and_then_is_no_line() -> None:
             floor.predict(1 / 30, 0.0, 0.0, 0.0)
         floor.update([sight(0.4)] if step % 12 == 0 else [], STILL, step * FRAME_NS)
         assert all(held.hits < 3 for held in floor.held)
+
+
+def blind(floor: FloorFilter, frames: int, at: int) -> int:
+    for _ in range(frames):
+        at += 1
+        floor.predict(FRAME_NS * 1e-9, 0.0, 0.0, 0.0)
+        floor.update([], STILL, at * FRAME_NS)
+    return at
+
+
+def after_a_second_without(frames: int = 30) -> tuple[FloorFilter, int]:
+    """A line held at 0.1 m by a drone at rest, not seen for so long since."""
+    floor, at = floor_filter(MotionNoise()), 0
+    for at in range(1, 40):
+        floor.predict(FRAME_NS * 1e-9, 0.0, 0.0, 0.0)
+        floor.update([sight(0.1)], STILL, at * FRAME_NS)
+    return floor, blind(floor, frames, at)
+
+
+def test_a_stain_that_shows_for_a_frame_where_a_lost_line_may_be_tells_no_motion() -> None:
+    floor, at = after_a_second_without()
+    assert floor.offset(0)[1] > 0.1, "the line may well be there"
+    for stain_m in (0.4, 0.12 + 0.25, -0.15):
+        floor.predict(FRAME_NS * 1e-9, 0.0, 0.0, 0.0)
+        floor.update([sight(stain_m)], STILL, (at + 1) * FRAME_NS)
+        at = blind(floor, 9, at + 1)
+        assert abs(floor.mean(VX)) < 0.05
+    assert floor.offset(0)[0] == pytest.approx(0.1, abs=0.03)
+
+
+@pytest.mark.parametrize("found_m", [0.38, 0.11, -0.2])
+def test_a_line_found_again_beside_where_it_was_reckoned_is_the_one_that_was_lost(found_m: float) -> None:
+    floor, at = after_a_second_without()
+    line = floor.held[0].id
+    for _ in range(3):
+        at += 1
+        floor.predict(FRAME_NS * 1e-9, 0.0, 0.0, 0.0)
+        floor.update([sight(found_m)], STILL, at * FRAME_NS)
+    assert [held.id for held in floor.held] == [line]
+    offset_m, sigma_m = floor.offset(0)
+    assert offset_m == pytest.approx(found_m, abs=0.02)
+    assert sigma_m < 0.02
+    assert abs(floor.mean(VX)) < 0.35, "it has drifted there since, however fast"
+
+
+def test_a_line_found_too_far_away_is_another_one() -> None:
+    floor, at = after_a_second_without()
+    for _ in range(4):
+        at += 1
+        floor.predict(FRAME_NS * 1e-9, 0.0, 0.0, 0.0)
+        floor.update([sight(0.1 + 0.5)], STILL, at * FRAME_NS)
+    assert sorted(round(floor.offset(n)[0], 1) for n in range(len(floor.held))) == [0.1, 0.6]

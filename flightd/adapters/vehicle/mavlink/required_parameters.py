@@ -137,7 +137,7 @@ _ARDUPILOT: tuple[Rule, ...] = (
         within(70, 100),
         "70 to 100 cm/s",
         "a landing of last resort is blind: it drifts for as long as it takes (1 m/s is a drop of 5 cm)",
-        100,
+        90,
     ),
 )
 

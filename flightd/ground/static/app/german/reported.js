@@ -155,6 +155,7 @@ export default {
   "the aisle is not closed any more": "der Gang ist nicht mehr geschlossen",
   "the flight log cannot be written": "das Flugprotokoll kann nicht geschrieben werden",
   "held for too long": "zu lange gehalten",
+  "no line seen in the take-off": "Keine Linie beim Start gesehen",
   "lines lost for too long": "Linien zu lange verloren",
   "no open line leads on from here": "keine offene Linie führt von hier weiter",
   "the start command is void": "der Startbefehl ist verfallen",

@@ -1,0 +1,229 @@
+"""Drones on their way to docks, on them, and in the queue before them.
+
+Whoever has nothing left to count and too little charge for a tour wants a dock.  It flies there once the
+dock that is best for it is free; until then it goes on to its own pad and waits there, in nobody's way.  A
+dock has one drone at a time, from when it is chosen until that drone has left it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from flightd.fleet.traffic.distances import Distances
+from flightd.fleet.traffic.docks import Dock, DockKind, Waiting, chosen_docks
+from flightd.fleet.traffic.drone_course import DroneCourse
+from flightd.fleet.traffic.plan import Stop
+from flightd.fleet.traffic.traffic_control import TrafficControl
+
+LANDINGS: Final = 3
+"""On one dock without contact; then the drone takes another one."""
+_CONTACT_MS: Final = 15_000
+"""A drone that stands on a dock says so by then."""
+_RETRY_MS: Final = 15_000
+_LEAVES_MS: Final = 40_000
+"""Until a dock is free of a drone that is done."""
+_TOLD_KEPT: Final = 200
+_HOVERS_MS: Final = 1_000
+"""Over a dock before it lands anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What is known of a drone: its charge, and whether it says that it is being charged."""
+
+    charge: float
+    charging: bool | None
+
+
+class DockQueue:
+    """The docks of one floor; without any, every drone is charged on its own pad."""
+
+    def __init__(
+        self, control: TrafficControl, distances: Distances, docks: Sequence[Dock], full_enough: float
+    ) -> None:
+        self._control = control
+        self._distances = distances
+        self._docks = {dock.name: dock for dock in docks}
+        self._full_enough = full_enough
+        self._homes: dict[str, int] = {}
+        self._holder: dict[str, str] = {}
+        self._since_ms: dict[str, int] = {}
+        self._landings: dict[str, int] = {}
+        self._shunned: dict[str, set[str]] = {}
+        self._next_try_ms: dict[str, int] = {}
+        self.waited_ms = 0
+        self._stranded: set[str] = set()
+        self.told: deque[str] = deque(maxlen=_TOLD_KEPT)
+        """The newest lines for people; `told_count` counts all."""
+        self.told_count = 0
+
+    @property
+    def are_there(self) -> bool:
+        """Whether there are any."""
+        return bool(self._docks)
+
+    def home(self, drone: str) -> int:
+        """Its own pad."""
+        course = self._control.drones[drone]
+        return self._homes.setdefault(drone, course.ends[0]) if self._docks else course.ends[0]
+
+    def keep_ms(self, drone: str) -> int:
+        """What has to be left of a battery on the drone's own pad: the way to a dock."""
+        if not self._docks:
+            return 0
+        return min(self._way_ms(self.home(drone), dock) for dock in self._docks.values())
+
+    def step(self, now_ms: int, known: dict[str, Standing], left_ms: dict[str, int]) -> None:
+        """Free docks, land anew, let those go that are done, and send who waits.  `known` are the drones that
+        may be sent; `left_ms` is how long each may fly still."""
+        self._free_docks()
+        for drone, standing in known.items():
+            self._watch_contact(drone, standing, now_ms)
+        waiting = self._waiting(known, left_ms, now_ms)
+        if waiting:
+            self._send(waiting, known, left_ms, now_ms)
+
+    def _tell(self, line: str) -> None:
+        self.told.append(line)
+        self.told_count += 1
+
+    def _dock_of(self, drone: str) -> Dock | None:
+        return next((self._docks[name] for name, holder in self._holder.items() if holder == drone), None)
+
+    def _free_docks(self) -> None:
+        """Of those who are neither on it nor going there."""
+        for name, drone in list(self._holder.items()):
+            course, place = self._control.drones[drone], self._docks[name].place
+            if place not in (course.place, _end_of(course)) and not course.wreck:
+                del self._holder[name]
+
+    def _watch_contact(self, drone: str, standing: Standing, now_ms: int) -> None:
+        course, dock = self._control.drones[drone], self._dock_of(drone)
+        if dock is None or course.ahead or course.place != dock.place:
+            return
+        if standing.charging:
+            self._landings.pop(drone, None)
+            self._shunned.pop(drone, None)
+        if (
+            standing.charging is not False
+            or now_ms - course.since_ms < _CONTACT_MS
+            or self._is_early(drone, now_ms)
+        ):
+            return
+        landings = self._landings[drone] = self._landings.get(drone, 0) + 1
+        self._next_try_ms[drone] = now_ms + _RETRY_MS
+        if landings < LANDINGS:
+            self._tell(f"{drone} has no contact on dock {dock.name}: it lands anew")
+            vertex = self._control.lanes.vertices[dock.place]
+            over = Stop(
+                self._control.lanes.over(vertex.node), self._control.lanes.column_of[vertex.node], _HOVERS_MS
+            )
+            self._give(drone, (over,), dock, now_ms)
+            return
+        self._tell(f"{drone} has no contact on dock {dock.name} after {landings} landings: it takes another")
+        self._landings.pop(drone)
+        self._shunned.setdefault(drone, set()).add(dock.name)
+        self._go_home(drone, now_ms)
+
+    def _waiting(self, known: dict[str, Standing], left_ms: dict[str, int], now_ms: int) -> list[Waiting]:
+        """Those that want a dock, who waited longest first."""
+        found: list[Waiting] = []
+        shut = frozenset().union(*map(self._control.avoided, self._control.drones))
+        for drone, standing in known.items():
+            course = self._control.drones[drone]
+            wants = not course.stops and standing.charge < self._full_enough and self._dock_of(drone) is None
+            if not wants:
+                self._since_ms.pop(drone, None)
+                continue
+            self._since_ms.setdefault(drone, now_ms)
+            at = course.base[-1].vertex if course.base else course.place
+            ways = {
+                dock.name: self._way_ms(at, dock) for dock in self._docks.values() if dock.place not in shut
+            }
+            near = {name: way_ms for name, way_ms in ways.items() if way_ms <= left_ms[drone]}
+            shunned = self._shunned.get(drone, set())
+            others = {name: way_ms for name, way_ms in near.items() if name not in shunned}
+            if not others:
+                self._shunned.pop(drone, None)  # all in reach: once more from the first
+            if ways and not near and not course.ahead and drone not in self._stranded:
+                self._stranded.add(drone)
+                self._tell(f"{drone} reaches no dock any more with what is left of its battery")
+            found.append(Waiting(drone, standing.charge, others or near))
+        return sorted(found, key=lambda each: (self._since_ms[each.drone], each.drone))
+
+    def _send(
+        self, waiting: Sequence[Waiting], known: dict[str, Standing], left_ms: dict[str, int], now_ms: int
+    ) -> None:
+        free_ms = {name: self._free_in_ms(name, known) for name in self._docks}
+        for drone, dock in chosen_docks(self._docks.values(), free_ms, waiting).items():
+            holder = self._holder.get(dock.name)
+            if holder is not None:
+                self._make_room(holder, dock, known, now_ms)
+            elif not self._is_early(drone, now_ms):
+                self._next_try_ms[drone] = now_ms + _RETRY_MS
+                if self._fly_to(drone, dock, left_ms[drone], now_ms):
+                    self._holder[dock.name] = drone
+                    self.waited_ms += now_ms - self._since_ms.pop(drone)
+
+    def _fly_to(self, drone: str, dock: Dock, left_ms: int, now_ms: int) -> bool:
+        """To a dock, if its battery lasts for that with all that it has to wait for; home otherwise."""
+        if not self._give(drone, (), dock, now_ms):
+            return False
+        if self._control.drones[drone].ahead[-1].end_ms - now_ms <= left_ms:
+            return True
+        self._go_home(drone, now_ms)
+        return False
+
+    def _make_room(self, holder: str, dock: Dock, known: dict[str, Standing], now_ms: int) -> None:
+        """Who is charged, and has nothing to do, goes home for whoever waits."""
+        course = self._control.drones[holder]
+        charged = holder in known and known[holder].charge >= self._full_enough
+        if charged and not course.ahead and course.place == dock.place and not self._is_early(holder, now_ms):
+            self._next_try_ms[holder] = now_ms + _RETRY_MS
+            self._go_home(holder, now_ms)
+
+    def _free_in_ms(self, name: str, known: dict[str, Standing]) -> int:
+        holder = self._holder.get(name)
+        if holder is None:
+            return 0
+        dock, course = self._docks[name], self._control.drones[holder]
+        standing = known.get(holder)
+        charge = 0.0 if standing is None else standing.charge
+        return self._distances.to(dock.place)[course.place] + dock.service_ms(charge) + _LEAVES_MS
+
+    def _is_early(self, drone: str, now_ms: int) -> bool:
+        return now_ms < self._next_try_ms.get(drone, 0)
+
+    def _give(self, drone: str, stops: tuple[Stop, ...], dock: Dock, now_ms: int) -> bool:
+        """To a dock; home, where it cannot be had any more."""
+        home = self.home(drone)
+        if not self._control.give(drone, stops, (dock.place,), now_ms):
+            return False
+        self._control.drones[drone].ends = (dock.place, home)
+        return True
+
+    def _go_home(self, drone: str, now_ms: int) -> None:
+        self._control.give(drone, (), (self.home(drone),), now_ms)
+
+    def _way_ms(self, place: int, dock: Dock) -> int:
+        net = self._control.net
+        return self._distances.to(dock.place)[place] + 4 * (net.launch_ms + net.stop_ms)
+
+
+def docks_of(
+    places: Iterable[tuple[str, int]], swaps: int, swap_s: float, charge_s: float
+) -> tuple[Dock, ...]:
+    """Docks at these pads (name, vertex), of which `swaps` are spread among them as swaps."""
+    pads = list(places)
+    kinds = [(i + 1) * swaps // len(pads) > i * swaps // len(pads) for i in range(len(pads))]
+    return tuple(
+        Dock(name, place, DockKind.SWAP, swap_s) if is_swap else Dock(name, place, DockKind.CONTACT, charge_s)
+        for (name, place), is_swap in zip(pads, kinds, strict=True)
+    )
+
+
+def _end_of(course: DroneCourse) -> int:
+    return course.ahead[-1].vertex if course.ahead else course.place
