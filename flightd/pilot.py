@@ -170,6 +170,7 @@ class Pilot:
             events=mission.drain_events(),
             findings=findings,
             settled=settled,
+            shared=known.shared,
         )
 
     def _take(self, commands: Sequence[Command], now_ns: int) -> None:

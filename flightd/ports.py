@@ -9,6 +9,7 @@ from flightd.core.exposure import ExposureState
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
 from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
+from flightd.core.shared_pose import SharedPose
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import (
     Attitude,
@@ -16,7 +17,6 @@ from flightd.core.types import (
     Command,
     Demand,
     Event,
-    GridPose,
     VehicleState,
 )
 
@@ -57,9 +57,9 @@ class Vehicle(Protocol):
 class PoseTaker(Protocol):
     """A vehicle whose own estimator can use the grid pose."""
 
-    def share_pose(self, pose: GridPose, pad_m: tuple[float, float] | None = None) -> None:
-        """Give it the newest pose, as often as there is one, and the place of the charge pad on the map
-        (metres) if it shall land by it.  Never blocks."""
+    def share_pose(self, pose: SharedPose | None, pad_m: tuple[float, float] | None = None) -> None:
+        """At each tick: what a new frame tells of the motion, None where there is none or it tells nothing;
+        and the place of the charge pad on the map (metres) if it shall land by it.  Never blocks."""
         ...
 
 

@@ -29,14 +29,19 @@ from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser, Mess
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
-from flightd.core.types import AttitudeSetpoint, Demand, GridPose
+from flightd.core.shared_pose import SharedPose
+from flightd.core.types import Attitude, AttitudeSetpoint, Demand
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.link import MavlinkChannel, UdpLink
 
 TICK_HZ = 50
 OTHERS_HZ = 32
 """What goes out besides setpoints: the pose, heartbeat, time comparison."""
-POSE = GridPose(0, "A1", 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01,) * 9, 0.9)
+POSE = SharedPose(
+    0, Attitude(0, 0.0, 0.0, 0.0), 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01, 0.01), (0.01, 0.01), 0.01, 0.9
+)
+TAKES = {"VISO_TYPE": 1.0, "EK3_SRC1_POSXY": 6.0, "EK3_SRC1_VELXY": 6.0, "FS_EKF_ACTION": 1.0}
+"""By these the autopilot's estimator takes our motion."""
 MIXTURE = ("attitude",) * 6 + ("distance", "position", "heartbeat", "battery")
 
 
@@ -81,7 +86,8 @@ class Sender:
                 self._mode = GUIDED_NOGPS
             self._link.send(channel, dialect.MAVLink_command_ack_message(message.command, 0))
         elif kind == "PARAM_REQUEST_READ":
-            value = dialect.MAVLink_param_value_message(message.param_id.encode(), 0.0, 9, 1, 0)
+            told = TAKES.get(message.param_id, 0.0)
+            value = dialect.MAVLink_param_value_message(message.param_id.encode(), told, 9, 1, 0)
             self._link.send(channel, value)
 
 

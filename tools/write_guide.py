@@ -17,7 +17,8 @@ from pathlib import Path
 
 from flightd.adapters.ground_link import protocol_text
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
-from flightd.adapters.vehicle.mavlink.required_parameters import Job, Rule, rules_for
+from flightd.adapters.vehicle.mavlink.parameter_rule import Rule
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for
 from flightd.config.schema import Config
 from flightd.guide import pages
 from flightd.mission.safety import hazard_table
@@ -44,8 +45,9 @@ def _parameters(firmware: Firmware) -> str:
         ('flying_mode = "guided"', Job(guided=True)),
         ("raw_thrust = true", Job(raw_thrust=True)),
         ("raw_thrust = false", Job(raw_thrust=False)),
-        ("pose_output", Job(shares_pose=True)),
-        ("landing_target", Job(landing_target=True)),
+        ('pose_output = "none"', Job(pose_output="none")),
+        ('pose_output = "odometry"', Job(pose_output="odometry")),
+        ("landing_target", Job(pose_output="odometry", landing_target=True)),
         ("battery.cells = 4", Job(cells=4)),
     ):
         rules += [(rule, key) for rule in rules_for(firmware, job) if not _is_in(rule, usual)]

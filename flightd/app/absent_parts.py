@@ -10,9 +10,10 @@ from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
 from flightd.core.refusal import Refusal
 from flightd.core.scanning import CodeSet
+from flightd.core.shared_pose import SharedPose
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickOutput
-from flightd.core.types import Command, Event, GridPose
+from flightd.core.types import Command, Event
 
 
 async def _idle() -> None:
@@ -126,7 +127,7 @@ class NothingKept:
         pass
 
 
-def keep_pose(pose: GridPose) -> None:
+def keep_pose(pose: SharedPose | None) -> None:
     """A vehicle whose estimator cannot use the pose is not given it."""
 
 

@@ -47,10 +47,11 @@ from flightd.core.errors import FlightdError, InputError
 from flightd.core.flight_order import FlightOrder
 from flightd.core.learnt import LearntSensors
 from flightd.core.preview import CameraName
+from flightd.core.shared_pose import SharedPose
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TICK_S
 from flightd.core.topics import Topic
-from flightd.core.types import AttitudeSetpoint, GridPose
+from flightd.core.types import AttitudeSetpoint
 from flightd.mission.battery.sorties import check_battery
 from flightd.mission.guidance import CEILING_MARGIN_M
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
@@ -376,8 +377,8 @@ def _plan_on(config: Config, flown: Site, order: FlightOrder) -> FlightPlan:
     return make_plan(flown, visits, start, home, policy, order.start_yaw_rad)
 
 
-def _pose_sharing(config: Config, site: Site, vehicle: Vehicle) -> Callable[[GridPose], None]:
-    """What gives the grid pose to the vehicle's own estimator, with the pad to land on if it shall."""
+def _pose_sharing(config: Config, site: Site, vehicle: Vehicle) -> Callable[[SharedPose | None], None]:
+    """What tells the vehicle's own estimator of the motion, and of the pad to land on if it shall."""
     if not config.vehicle.shares_pose or not isinstance(vehicle, PoseTaker):
         return keep_pose
     pad = site.nodes[site.home.node]

@@ -13,8 +13,9 @@ from flightd.core.errors import FlightdError
 from flightd.core.learnt import LearntSensors
 from flightd.core.refusal import Refusal
 from flightd.core.scanning import CodeSet
+from flightd.core.shared_pose import SharedPose
 from flightd.core.tick import TickOutput
-from flightd.core.types import AttitudeSetpoint, GridPose, LineSet
+from flightd.core.types import AttitudeSetpoint, LineSet
 from flightd.pilot import Pilot
 from flightd.ports import Camera, Clock, Ground, Interlock, Recorder, Vehicle
 
@@ -139,7 +140,7 @@ class Kept(Protocol[T_contra]):
 class Flight:
     """Everything composed; nothing runs yet.
 
-    `share_pose` gives the vehicle's own estimator the pose, where it can use it.  `startup_fault` is what
+    `share_pose` tells the vehicle's own estimator of the motion, where it takes it.  `startup_fault` is what
     the daemon should not fly with: on the ground it ends with that; a vehicle that it finds flying is looked
     after all the same.  `down_frames` are the down camera's on their way to `vision`."""
 
@@ -156,7 +157,7 @@ class Flight:
     progress: Kept[LeftOver]
     learnt: Kept[LearntSensors]
     publishers: TelemetryPublishers
-    share_pose: Callable[[GridPose], None]
+    share_pose: Callable[[SharedPose | None], None]
     interlock: Interlock
     fitness: Fitness
     startup_fault: FlightdError | None = None

@@ -91,9 +91,7 @@ class Tick:
         call("setpoints", lambda: flight.setpoints.set(output.setpoint), None)
         if output.setpoint is None:
             call("detection", flight.vision.not_flying, None)
-        pose = output.pose
-        if pose is not None:
-            call("pose output", lambda: flight.share_pose(pose), None)
+        call("pose output", lambda: flight.share_pose(output.shared), None)
         call("count", lambda: flight.counting.keep(output), None)
         call("front camera", lambda: flight.front_camera.expose(flight.pilot.exposure), None)
         call("progress", self._keep, None)

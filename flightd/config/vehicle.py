@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
 from flightd.config.section import Section
 
+PoseChoice: TypeAlias = Literal["auto", "none", "odometry", "vision_position"]
+_SPEAKING = frozenset({"ardupilot", "px4"})
+"""Kinds that the adapter of our own speaks to."""
 _STATIONS = frozenset({245, 255})
 """System ids by which ground stations and their libraries go."""
 
@@ -52,16 +55,18 @@ class VehicleConfig(Section):
     signing_stamp: Path | None = Field(
         None, description="where the newest signing time stamp is kept; none: beside the key, as KEY.stamp"
     )
-    pose_output: Literal["none", "odometry", "vision_position"] = Field(
-        "none", description="message that gives the grid pose to the autopilot's estimator, at 30 Hz"
+    pose_output: PoseChoice = Field(
+        "auto",
+        description="message that tells the autopilot's estimator of our motion, at 30 Hz at most, so that "
+        "its attitude stays true; auto: odometry where an ArduCopter's or PX4's parameters take it",
     )
     origin_deg: tuple[
         Annotated[float, Field(ge=-90, le=90)],
         Annotated[float, Field(ge=-180, le=180)],
     ] = Field(
         (51.4778, 0.0),
-        description="ArduCopter with pose_output: the hall's latitude and longitude, roughly; its estimator "
-        "has to have some",
+        description="ArduCopter that takes pose_output: the hall's latitude and longitude, roughly; its "
+        "estimator has to have some",
     )
     range_finder: int | None = Field(
         None,
@@ -92,25 +97,27 @@ class VehicleConfig(Section):
             raise ValueError('flying_mode is ArduCopter\'s: take it out, or set kind = "ardupilot"')
         if self.kind != "ardupilot" and self.raw_thrust is not None:
             raise ValueError('raw_thrust is ArduCopter\'s: take it out, or set kind = "ardupilot"')
-        speaks = self.kind in {"ardupilot", "px4"}
+        speaks = self.kind in _SPEAKING
         for key, wanted in (
             ("signing_key", self.signing_key is not None),
-            ("pose_output", self.shares_pose),
+            ("pose_output", self.pose_output not in {"auto", "none"}),
             ("range_finder", self.range_finder is not None),
         ):
             if wanted and not speaks:
                 raise ValueError(f'{key} needs kind = "ardupilot" or "px4", not "{self.kind}"')
         if self.signing_stamp is not None and self.signing_key is None:
             raise ValueError("signing_stamp without signing_key: give the key too, or take it out")
-        if self.landing_target and not self.shares_pose:
+        if self.landing_target and self.pose_output in {"auto", "none"}:
             raise ValueError(
-                "landing_target needs pose_output: precision landing flies by the autopilot's own position"
+                'landing_target needs pose_output = "odometry": precision landing flies by the autopilot\'s '
+                "own position, which must not be left to its parameters"
             )
         return self
 
     @property
     def shares_pose(self) -> bool:
-        return self.pose_output != "none"
+        """Whether it is told of our motion, if its parameters take it."""
+        return self.pose_output != "none" and self.kind in _SPEAKING
 
     @property
     def stamp_file(self) -> Path | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from flightd.core.refusal import Refusal
 from flightd.core.scanning import CodeSet, Finding, Settled
+from flightd.core.shared_pose import SharedPose
 from flightd.core.tracks import TrackSet
 from flightd.core.types import (
     HEALTHY,
@@ -69,6 +70,8 @@ class TickOutput:
     events: tuple[Event, ...] = field(default=())
     findings: tuple[Finding, ...] = ()
     settled: tuple[Settled, ...] = ()
+    shared: SharedPose | None = None
+    """What the vehicle's own estimator may be told of the motion, once for each frame."""
 
 
 @dataclass(frozen=True, slots=True)

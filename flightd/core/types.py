@@ -222,6 +222,16 @@ class LandedState(enum.StrEnum):
     IN_AIR = "in_air"
 
 
+class PoseUse(enum.StrEnum):
+    """Whether the vehicle's own estimator gets our motion: it is not to be given (NONE), what it takes is not
+    known yet, by its parameters it takes none, or it is given."""
+
+    NONE = "none"
+    UNKNOWN = "unknown"
+    NOT_TAKEN = "not_taken"
+    GIVEN = "given"
+
+
 @dataclass(frozen=True, slots=True)
 class VehicleState:
     """The newest that the vehicle told, each group with its own time.
@@ -261,6 +271,7 @@ class VehicleState:
     unfit: Refusal | None = None
     climb_contradicted: bool = False
     keeps_climb: bool = False
+    pose_use: PoseUse = PoseUse.NONE
 
     @property
     def may_fly(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
+from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding
 from flightd.config.schema import Config
 from flightd.core.exposure import ExposureState
 from flightd.core.types import VehicleState
@@ -13,6 +13,7 @@ from flightd.doctor.calibration import check_calibration, check_learnt
 from flightd.doctor.check import Check, CheckLevel, error, ok, unseen, warning
 from flightd.doctor.exposure import Seen, check_exposure, check_front_exposure
 from flightd.doctor.machine import check_clock, check_disk, check_processor
+from flightd.doctor.pose import check_pose
 from flightd.site.site import Site
 
 _OLD_S = 3.0
@@ -54,6 +55,7 @@ def judge_running(config: Config, found: Running) -> list[Check]:
     return [
         ok("config", found.file),
         _vehicle(config, found),
+        *(check_pose(found.vehicle.pose_use) if found.vehicle is not None else []),
         *_parameters(found),
         _camera(config, found),
         *(check_exposure(config, found.exposure) if found.pictures_hz else []),
@@ -89,7 +91,7 @@ def _parameters(found: Running) -> list[Check]:
     return [
         Check(
             "parameter",
-            CheckLevel.ERROR,
+            CheckLevel.WARNING if finding.advised else CheckLevel.ERROR,
             str(finding),
             "choose it yourself, in the autopilot's own ground station"
             if finding.better is None

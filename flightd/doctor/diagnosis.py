@@ -11,7 +11,7 @@ from typing import Any
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
-from flightd.adapters.vehicle.mavlink.required_parameters import ParameterFinding
+from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding
 from flightd.config.schema import Config
 from flightd.doctor import camera, machine, vehicle
 from flightd.doctor.calibration import check_calibration, check_learnt
@@ -124,7 +124,8 @@ async def measure_delay(
 async def fix_parameters(found: Diagnosis, config: Config, agreed: Sequence[str], clock: Clock) -> Diagnosis:
     """Write the better values of the parameters `agreed` on by name; the diagnosis with what is known now."""
     autopilot = await vehicle.examine(config.vehicle, clock, agreed, config.battery.cells)
-    rest = [check for check in found.checks if check.name not in {"vehicle", "parameter"}]
+    anew = {"parameter", *(check.name for check in autopilot.checks)}
+    rest = [check for check in found.checks if check.name not in anew]
     return Diagnosis([*rest, *autopilot.checks], autopilot.report, autopilot.fixed)
 
 

@@ -16,6 +16,7 @@ from flightd.config.schema import Config
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import UnavailableError
 from flightd.doctor.check import Check, error, ok, warning
+from flightd.doctor.pose import check_pose
 from flightd.ports import Clock
 
 _NAMES = {Firmware.ARDUPILOT: "ArduCopter", Firmware.PX4: "PX4"}
@@ -81,14 +82,15 @@ def judge(config: VehicleConfig, report: ExaminationReport, cells: int | None = 
         checks.append(warning("heartbeat", str(slow), _BEATS))
     else:
         checks.append(ok("heartbeat", f"{report.heartbeat_hz:.0f} heartbeats a second"))
-    checks += [_judge_range(config, report), _judge_cells(cells, report)]
+    checks += [_judge_range(config, report), _judge_cells(cells, report), *check_pose(report.pose_use)]
     for found in report.findings:
         remedy = (
             "choose it yourself, in a ground station"
             if found.better is None
             else f"--fix sets {found.better:g}"
         )
-        checks.append(error("parameter", str(found), remedy))
+        level = warning if found.advised else error
+        checks.append(level("parameter", str(found), remedy))
     return checks
 
 

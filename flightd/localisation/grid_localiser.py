@@ -99,6 +99,8 @@ class GridLocaliser:
         self._node = start_node
         self._gap = False
         self._reach = Reach(site, self._paint)
+        self.corrections = 0
+        """How often another place was believed than before."""
         self._way: tuple[float, float] | None = None
         self._start(start_node)
 
@@ -302,6 +304,7 @@ class GridLocaliser:
             for axis in (0, 1):
                 self._judged[axis][:] = [at + float(jump[axis]) for at in self._judged[axis]]
             places.best = likeliest
+            self.corrections += 1
         here = places.at_m[places.best]
         node = self._nodes.node(float(here[0]), float(here[1])).id
         if node != self._node:

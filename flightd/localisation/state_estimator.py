@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from flightd.config.schema import Config
 from flightd.control.flight_controller import CALM, Conditions
 from flightd.core.learnt import LearntSensors
+from flightd.core.shared_pose import SharedPose
 from flightd.core.tick import TICK_S, TickInput
 from flightd.core.tracks import TrackSet
 from flightd.core.types import AttitudeSetpoint, GridPose, LineSet, VehicleState
@@ -40,6 +41,8 @@ _CLIMB_DOUBT_M = 1.0
 was found to be wrong is put right down to the floor."""
 _GAP_NS = 100_000_000
 """Frames further apart do not follow each other."""
+_LEAST_INTEGRITY = 0.5
+"""Below, nothing is told to the vehicle's own estimator."""
 _WAIT_NS = 300_000_000
 """So old a frame is used by the attitude that is assumed of its exposure."""
 
@@ -55,6 +58,8 @@ class Estimate:
     by_pad: bool
     lead: Lead = NO_LEAD
     conditions: Conditions = CALM
+    shared: SharedPose | None = None
+    """What the vehicle's own estimator may be told, once for each frame."""
 
 
 class StateEstimator:
@@ -116,7 +121,7 @@ class StateEstimator:
         self._climbed_m, self._climb_ns = 0.0, 0
         self._carried = CarriedHeight()
         self._waiting: deque[LineSet] = deque()
-        self._judged_ns = 0
+        self._judged_ns = self._shared_ns = 0
         self._frames_s = 0.0
         self._unleant = (0.0, 0.0)
         self.armed = armed
@@ -196,7 +201,43 @@ class StateEstimator:
             self.pads.step(tracks, pose)
         by_pad = None if pose is None else self.pads.over(pose, self.localiser.ever_matched)
         lead = self.tracker.lead(now_ns, now_ns + round(self.response.delay_s * 1e9))
-        return Estimate(height_m, tracks, by_pad or pose, by_pad is not None, lead, self._conditions(now_ns))
+        conditions, shared = self._conditions(now_ns), None if pose is None else self._shared(now_ns, pose)
+        return Estimate(height_m, tracks, by_pad or pose, by_pad is not None, lead, conditions, shared)
+
+    def _shared(self, now_ns: int, pose: GridPose) -> SharedPose | None:
+        """What a new frame tells the vehicle's own estimator; nothing of lines that the map does not have,
+        nor over heights that a stuck range finder made.
+
+        The motion hangs on the lines, not on which node they belong to: of two places that are confused it is
+        the same.  Only once no place is likelier than all others the lines themselves are doubted."""
+        seen_ns = self.tracker.newest_ns
+        motion = self.tracker.exposure_motion(now_ns) if seen_ns > self._shared_ns else None
+        height_m = self._heights.at(seen_ns)
+        if motion is None or self._stuck.found or not height_m > 0.0 or pose.integrity < _LEAST_INTEGRITY:
+            return None
+        self._shared_ns = seen_ns
+        told_ns = self.localiser.told_ns
+        x_variance, y_variance = (
+            variance if seen_ns - told_ns[axis] < _GAP_NS else math.nan
+            for axis, variance in enumerate(motion.variances)
+        )
+        if math.isnan(x_variance) and math.isnan(y_variance):
+            return None
+        return SharedPose(
+            stamp_ns=seen_ns,
+            attitude=motion.attitude,
+            yaw_rad=motion.yaw_rad,
+            x_m=pose.x_m - motion.since_m[0],
+            y_m=pose.y_m - motion.since_m[1],
+            vx_mps=motion.speed_mps[0],
+            vy_mps=motion.speed_mps[1],
+            height_m=height_m,
+            position_variances=(pose.covariance[0], pose.covariance[4]),
+            speed_variances=(x_variance, y_variance),
+            height_variance=self._heights.error_m**2,
+            integrity=pose.integrity,
+            corrections=self.localiser.corrections,
+        )
 
     def _conditions(self, now_ns: int) -> Conditions:
         """What the position loop has to reckon with: a push that nothing leans against yet, and how late it

@@ -81,6 +81,17 @@ class Lead(NamedTuple):
 NO_LEAD = Lead(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class ExposureMotion(NamedTuple):
+    """The motion at the exposure of the newest frame: the attitude told for then, heading, speed along the
+    grid axes with its variances (NaN along an axis of which that frame tells nothing), and the way since."""
+
+    attitude: Attitude
+    yaw_rad: float
+    speed_mps: tuple[float, float]
+    variances: tuple[float, float]
+    since_m: tuple[float, float]
+
+
 class LineTracker:
     """Feed `attitude` and `frame`, read `at`.  Before the first frame `at` gives None.
 
@@ -116,6 +127,7 @@ class LineTracker:
         self._features_ns = [0, 0]
         self._trust = FeatureTrust()
         self._stamp_ns = self._told_ns = 0
+        self._seen_in: Attitude | None = None
         self._pads: tuple[PadOffset, ...] = ()
         self._junctions: tuple[FloorJunction, ...] = ()
         self._markers: tuple[MarkerOffset, ...] = ()
@@ -222,6 +234,7 @@ class LineTracker:
             self._features_ns[axis] = stamp_ns
         places = {seen.id: (seen.across[0].offset_m, seen.across[1].offset_m) for seen in features}
         self._trust.step(places, self._filter.speeds(stamp_ns), stamp_ns)
+        self._seen_in = None if assumed else attitude
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))
         marks = _placed(lines.markers, view, yaw)
@@ -230,6 +243,27 @@ class LineTracker:
         if sights:
             self._lines_ns = stamp_ns
         return True
+
+    def exposure_motion(self, now_ns: int) -> ExposureMotion | None:
+        """What the newest frame tells of the motion; None where it was laid over an attitude that was only
+        assumed, or lines contradict the heading."""
+        told, held = self._seen_in, self._filter
+        if told is None or self._stamp_ns == 0 or self._dispute.error_rad:
+            return None
+        by_lines = held.speeds(self._stamp_ns)
+        variances = [
+            held.sigma(VX + axis) ** 2
+            if by_lines[axis] is not None or self._features_ns[axis] == self._stamp_ns
+            else math.nan
+            for axis in range(2)
+        ]
+        return ExposureMotion(
+            replace(told, stamp_ns=self._stamp_ns),
+            wrap_pi(told.yaw_rad + held.mean(PSI)),
+            (held.mean(VX), held.mean(VY)),
+            (variances[0], variances[1]),
+            self._carried_to(now_ns)[2:4],
+        )
 
     def at(self, now_ns: int) -> TrackSet | None:
         """The tracks carried on to `now_ns`, or None before the first frame."""

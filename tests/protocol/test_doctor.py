@@ -84,7 +84,7 @@ def write_config(folder: Path, vehicle: dict[str, Any], camera: dict[str, Any] |
         },
         "vision": {"workers": 1},
         "recorder": {"folder": str(folder / "flights"), "reserve_gb": 0.0},
-        "vehicle": vehicle,
+        "vehicle": {"pose_output": "none", **vehicle},
     }
     path = folder / "flightd.toml"
     text = "".join(
@@ -183,11 +183,30 @@ def test_the_job_decides_what_is_right(tmp_path: Path, doctor: Doctor) -> None:
         assert set(found) - WRONG == {
             "GUID_OPTIONS",
             "VISO_TYPE",
+            "VISO_DELAY_MS",
             "EK3_SRC1_POSXY",
-            "EK3_SRC1_YAW",
+            "EK3_SRC1_VELXY",
             "PLND_ENABLED",
         }
         assert found["GUID_OPTIONS"] == 8
+
+
+def test_an_estimator_that_could_take_our_motion_is_fit_to_fly_and_set_by_a_fix(
+    tmp_path: Path, doctor: Doctor
+) -> None:
+    with serving(Px4Peer) as (peer, url):
+        config = write_config(tmp_path, {"url": url, "kind": "px4", "pose_output": "auto"})
+        code, out, _ = doctor(config, "--json")
+        document = json.loads(out)
+        assert (code, by_name(document, "pose")["level"]) == (0, "warning")
+        assert [(entry["name"], entry["advised"]) for entry in document["parameters"]] == [
+            ("EKF2_EV_CTRL", True)
+        ]
+        code, out, _ = doctor(config, "--fix", "--yes", "--json")
+        document = json.loads(out)
+        assert (code, document["fixed"]) == (0, ["EKF2_EV_CTRL"])
+        assert by_name(document, "pose")["level"] == "ok"
+        assert peer.parameters["EKF2_EV_CTRL"] == 4
 
 
 def test_px4_behind_either_adapter_and_the_wrong_kind(tmp_path: Path, doctor: Doctor) -> None:

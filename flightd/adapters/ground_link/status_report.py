@@ -118,4 +118,5 @@ def _vehicle(state: VehicleState, now_ns: int) -> VehicleReport:
         telemetry_age_s=(now_ns - state.attitude.stamp_ns) * 1e-9,
         heartbeat_age_s=(now_ns - state.heartbeat_ns) * 1e-9,
         refusal=words(state.refusal),
+        pose_use=state.pose_use.value,
     )

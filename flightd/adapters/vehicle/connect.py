@@ -76,7 +76,13 @@ def _options(config: VehicleConfig, clock: Clock, opener: OpenDatagrams, cells: 
         system_id=config.system_id,
         job=Job.of(config, cells),
         signing=signing_of(config, clock),
-        pose_form=PoseForm(config.pose_output) if config.shares_pose else None,
+        pose_form=_form(config),
         origin_deg=config.origin_deg,
         opener=opener,
     )
+
+
+def _form(config: VehicleConfig) -> PoseForm | None:
+    if not config.shares_pose:
+        return None
+    return PoseForm.ODOMETRY if config.pose_output == "auto" else PoseForm(config.pose_output)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
-from flightd.adapters.vehicle.mavlink.required_parameters import FIRMWARES, Job, rules_for
+from flightd.adapters.vehicle.mavlink.required_parameters import FIRMWARES, Job, advice_for, rules_for
 from flightd.app.build import plan_of, start_of
 from flightd.app.flight_orders import configured_order
 from flightd.app.recording import FlightSetting
@@ -104,9 +104,10 @@ def _set_up(config: Config) -> dict[str, float]:
     is_px4 = firmware is Firmware.PX4
     known: Mapping[str, float | int] = PX4_PARAMETERS if is_px4 else COPTER_PARAMETERS
     values = {**known, **shipped_parameters("px4" if is_px4 else "ardupilot", known)}
+    job = Job.of(config.vehicle, config.battery.cells)
     return {
         name: rule.better
-        for rule in rules_for(firmware, Job.of(config.vehicle, config.battery.cells))
+        for rule in (*rules_for(firmware, job), *advice_for(firmware, job))
         for name in rule.names
         if name in values and rule.better is not None and not rule.fits(values[name])
     }

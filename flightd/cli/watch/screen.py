@@ -27,6 +27,7 @@ _SILENT_S = 1.0
 _TRAIL_STEP_M = 0.1
 _STAGES = ("capture", "transport", "detection", "track", "wire", "total")
 _COLOURS = {EventLevel.INFO: "", EventLevel.WARNING: "yellow", EventLevel.ERROR: "bold red"}
+_POSE_USES = {"given": "gets our motion", "not_taken": "does not take our motion"}
 _ALARMING = {Phase.RECOVER, Phase.HOLD, Phase.RELOCATE, Phase.LAND, Phase.ABORTED, Phase.PILOT}
 
 
@@ -199,6 +200,8 @@ class WatchApp(App[None]):
                 "telemetry",
                 f"{vehicle.telemetry_age_s * 1e3:.0f} ms, heartbeat {vehicle.heartbeat_age_s:.1f} s",
             )
+            if vehicle.pose_use in _POSE_USES:
+                table.add_row("estimator", _POSE_USES[vehicle.pose_use])
             if vehicle.refusal:
                 table.add_row("refused", Text(vehicle.refusal, "red"))
         age = "never" if report.lines_age_s is None else f"{report.lines_age_s * 1e3:.0f} ms ago"

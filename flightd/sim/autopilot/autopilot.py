@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.ports import Clock
 from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
+from flightd.sim.autopilot.external_vision import ExternalVision, Taken
 from flightd.sim.autopilot.link import Address, MavlinkChannel, Message, UdpLink
 from flightd.sim.autopilot.parameters import ParameterServer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
@@ -122,6 +123,7 @@ class AutopilotPeer(abc.ABC):
         self._steps = 0
         self._truth = TruthHistory(_TRUTH_SAMPLES)
         self._truth.add(airframe.kinematics(self._now_ns))
+        self.vision = ExternalVision(self.sensors, self._truth.at)
         self._address: Address | None = None
         self.armed = False
         self.landed = True
@@ -180,6 +182,7 @@ class AutopilotPeer(abc.ABC):
             self.airframe.step(dt_s, self._control(dt_s))
             self.sensors.update(dt_s, self.airframe)
             self._steps += 1
+            self.vision.step(dt_s, self.airframe)
             if self._steps % _TRUTH_EVERY == 0:
                 self._truth.add(self.airframe.kinematics(self._now_ns))
 
@@ -301,6 +304,19 @@ class AutopilotPeer(abc.ABC):
     def _setpoint(self, message: Message) -> None:
         """Take a SET_ATTITUDE_TARGET that is addressed to this system."""
 
+    @abc.abstractmethod
+    def _taken(self) -> Taken:
+        """What its parameters say of poses that it is told."""
+
+    @abc.abstractmethod
+    def _exposed_ns(self, stamp_ns: int, now_ns: int) -> int:
+        """The moment of a pose that its sender's clock says is of `stamp_ns`, as the autopilot reckons it."""
+
+    def _take_pose(self, message: Message, now_ns: int) -> None:
+        stamp_us = message.time_usec if message.get_type() == "ODOMETRY" else message.usec
+        exposed_ns = min(self._exposed_ns(stamp_us * 1000, now_ns), now_ns)
+        self.vision.take(message, self._taken(), exposed_ns, now_ns)
+
     def _client_beat(self, system_id: int) -> None:  # noqa: B027 - PX4 goes by the setpoints alone
         """Take the HEARTBEAT of somebody on the link."""
 
@@ -370,6 +386,8 @@ class AutopilotPeer(abc.ABC):
                 self._setpoint(message)
             case "HEARTBEAT":
                 self._client_beat(message.get_srcSystem())
+            case "ODOMETRY" | "VISION_POSITION_ESTIMATE":
+                self._take_pose(message, now_ns)
             case "SET_MODE":
                 self._set_mode(message.custom_mode)
             case "TIMESYNC" if message.tc1 == 0:
@@ -381,15 +399,15 @@ class AutopilotPeer(abc.ABC):
                 self.texts.append(message.text)
             case "SETUP_SIGNING" if self.takes_keys and not self.armed:
                 self.link.sign(bytes(message.secret_key), message.initial_timestamp)
-            case "PARAM_REQUEST_READ" if not self._queues(now_ns):
-                pass
-            case "PARAM_REQUEST_READ" | "PARAM_REQUEST_LIST" | "PARAM_SET":
+            case "PARAM_REQUEST_READ" | "PARAM_REQUEST_LIST" | "PARAM_SET" if self._queues(message, now_ns):
                 self.parameters.answer(message, lambda reply: self.link.send(channel, reply))
             case _:
                 pass
 
-    def _queues(self, now_ns: int) -> bool:
+    def _queues(self, message: Message, now_ns: int) -> bool:
         """Whether there is room for another request for a parameter."""
+        if message.get_type() != "PARAM_REQUEST_READ":
+            return True
         if now_ns - self._burst_ns > _BURST_NS:
             self._burst_ns, self._burst = now_ns, 0
         self._burst += 1

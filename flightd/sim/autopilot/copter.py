@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import enum
 import random
+from collections import deque
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.ports import Clock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
+from flightd.sim.autopilot.external_vision import NOT_TAKEN, Taken
 from flightd.sim.autopilot.guided import AngleTarget
-from flightd.sim.autopilot.link import Message
+from flightd.sim.autopilot.link import MavlinkChannel, Message
 from flightd.sim.autopilot.parameters import COPTER_PARAMETERS, ParameterServer
 from flightd.sim.autopilot.telemetry import LANDED_AIR, LANDED_GROUND, LANDED_LANDING
 from flightd.sim.plant.airframe import Airframe, AirframeCommand
@@ -28,6 +30,10 @@ _WATCH_S = 1.0 / 3.0
 _GCS_LAND = 5
 """FS_GCS_ENABLE: land."""
 _FORCE = 21196
+_EXTERNAL = 6
+"""EK3_SRC1_*: external navigation."""
+_LAGS = 100
+_ORIGIN_ID = dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN
 
 
 class CopterMode(enum.IntEnum):
@@ -77,6 +83,8 @@ class ArduCopterPeer(AutopilotPeer):
         self._low_battery_s = 0.0
         self._client_silent_s: float | None = None
         self._client_lost = False
+        self._origin: tuple[int, int] | None = None
+        self._pose_lags: deque[int] = deque(maxlen=_LAGS)
         self._watch_due_s = random.Random(config.seed).uniform(0.0, _WATCH_S)
 
     def reboot(self) -> None:
@@ -84,6 +92,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._disarm()
         self.mode = CopterMode.STABILIZE
         self._target = AngleTarget()
+        self._origin = None
         self.link.broadcast(self._heartbeat())
 
     # Commands
@@ -140,8 +149,8 @@ class ArduCopterPeer(AutopilotPeer):
     def _arming_refusal(self) -> str | None:
         if not self.is_ready:
             return "PreArm: Gyros still settling"
-        if self.arming_block:
-            return f"PreArm: {self.arming_block}"
+        if self.arming_block or (self.parameters["VISO_TYPE"] and not self.vision.is_heard):
+            return f"PreArm: {self.arming_block or 'VisOdom: not healthy'}"
         if self.airframe.battery_v < self.parameters["BATT_LOW_VOLT"]:
             return "PreArm: Battery 1 below minimum arming voltage"
         if self.mode in _NOT_ARMABLE:
@@ -161,6 +170,27 @@ class ArduCopterPeer(AutopilotPeer):
     def _client_beat(self, system_id: int) -> None:
         if system_id == self.parameters["SYSID_MYGCS"]:
             self._client_silent_s = 0.0
+
+    def received(self, channel: MavlinkChannel, message: Message) -> None:
+        if message.get_type() == "SET_GPS_GLOBAL_ORIGIN" and self._origin is None:
+            self._origin = message.latitude, message.longitude
+        super().received(channel, message)
+
+    def _taken(self) -> Taken:
+        """Its estimator wants an origin, and a place before it takes anything."""
+        parameters = self.parameters
+        if not parameters["VISO_TYPE"] or self._origin is None:
+            return NOT_TAKEN
+        if parameters["EK3_SRC1_POSXY"] != _EXTERNAL:
+            return NOT_TAKEN
+        speed = parameters["EK3_SRC1_VELXY"] == _EXTERNAL
+        return Taken(speed=speed, place=True, speed_sigma_mps=parameters["VISO_VEL_M_NSE"])
+
+    def _exposed_ns(self, stamp_ns: int, now_ns: int) -> int:
+        """It knows nothing of its sender's clock: the fastest pose of late is VISO_DELAY_MS old."""
+        self._pose_lags.append(now_ns - stamp_ns)
+        least_ns = min(self._pose_lags)
+        return stamp_ns + least_ns - round(self.parameters["VISO_DELAY_MS"] * 1e6)
 
     # Flight code
 
@@ -255,6 +285,14 @@ class ArduCopterPeer(AutopilotPeer):
                 self._set_mode(CopterMode.LAND)
 
     # Reports
+
+    def knows(self, message_id: int) -> bool:
+        return super().knows(message_id) or (message_id == _ORIGIN_ID and self._origin is not None)
+
+    def messages(self, message_id: int) -> tuple[Message, ...]:
+        if message_id == _ORIGIN_ID and self._origin is not None:
+            return (dialect.MAVLink_gps_global_origin_message(*self._origin, 0),)
+        return super().messages(message_id)
 
     def _refresh(self, now_ns: int) -> None:
         super()._refresh(now_ns)

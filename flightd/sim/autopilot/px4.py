@@ -13,8 +13,9 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.ports import Clock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
+from flightd.sim.autopilot.external_vision import Taken
 from flightd.sim.autopilot.guided import euler
-from flightd.sim.autopilot.link import Message
+from flightd.sim.autopilot.link import MavlinkChannel, Message
 from flightd.sim.autopilot.parameters import PX4_PARAMETERS, ParameterServer
 from flightd.sim.autopilot.telemetry import LANDED_AIR, LANDED_GROUND, LANDED_LANDING
 from flightd.sim.plant.airframe import Airframe, AirframeCommand
@@ -24,6 +25,9 @@ _STREAM_GAP_S = 0.5
 _IDLE_COLLECTIVE = 0.04
 _LAND_DETECT_S = 1.0
 _FORCE = 21196
+_EV_PLACE, _EV_SPEED = 1, 4
+"""Bits of EKF2_EV_CTRL."""
+_TIMESYNC_NS = 1_000_000_000
 _IGNORE_YAW_RATE = 4
 _IGNORE_THRUST = 64
 _IGNORE_ATTITUDE = 128
@@ -61,6 +65,7 @@ class Px4Peer(AutopilotPeer):
         parameters = ParameterServer({**PX4_PARAMETERS, **config.parameters}, bytewise=True)
         super().__init__(clock, airframe, config, parameters)
         self.instruments.tell_local_position()
+        self.streams.timesync_ns = _TIMESYNC_NS
         self.mode = Px4Mode.ALTCTL
         self._q_target = (0.0, 0.0, 0.0)
         self._yaw_rate_radps = 0.0
@@ -68,6 +73,8 @@ class Px4Peer(AutopilotPeer):
         self._setpoint_age_s = math.inf
         self._stream_s = 0.0
         self._has_flown = False
+        self._companion_ns: int | None = None
+        """Its companion's clock is so far ahead of its own since boot."""
 
     @property
     def thrust(self) -> float:
@@ -84,6 +91,7 @@ class Px4Peer(AutopilotPeer):
         self._disarm()
         self.mode = Px4Mode.ALTCTL
         self._setpoint_age_s, self._stream_s = math.inf, 0.0
+        self._companion_ns = None
 
     # Commands
 
@@ -149,6 +157,24 @@ class Px4Peer(AutopilotPeer):
 
     def _on_disarmed(self) -> None:
         self.say(dialect.MAV_SEVERITY_INFO, "Disarmed")
+
+    def received(self, channel: MavlinkChannel, message: Message) -> None:
+        if message.get_type() == "TIMESYNC" and message.tc1:
+            now_ns = self.boot_clock_ns(self._clock.now_ns())
+            self._companion_ns = message.tc1 - (message.ts1 + now_ns) // 2
+        super().received(channel, message)
+
+    def _taken(self) -> Taken:
+        bits = int(self.parameters["EKF2_EV_CTRL"])
+        return Taken(speed=bool(bits & _EV_SPEED), place=bool(bits & _EV_PLACE), own_attitude=True)
+
+    def _exposed_ns(self, stamp_ns: int, now_ns: int) -> int:
+        """By its companion's clock as TIMESYNC compared it; until then a pose is of when it came."""
+        if self._companion_ns is None:
+            return now_ns
+        boot_ns = stamp_ns - self._companion_ns
+        age_ns = self.boot_clock_ns(now_ns) - boot_ns + round(self.parameters["EKF2_EV_DELAY"] * 1e6)
+        return now_ns - age_ns
 
     def _setpoint(self, message: Message) -> None:
         """Proof of life in any mode; obeyed in OFFBOARD only.  A missing thrust is none at all."""

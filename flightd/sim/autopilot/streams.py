@@ -34,7 +34,9 @@ class MessageStreams:
         self._source = source
         self._step_ns = step_ns
         self._heartbeat_due_ns = now_ns
-        self._timesync_due_ns = now_ns + _TIMESYNC_NS
+        self.timesync_ns = _TIMESYNC_NS
+        """How often clocks are compared."""
+        self._timesync_ns = now_ns
 
     def send_due(self, now_ns: int) -> None:
         """Send what is due; what was missed is not sent later."""
@@ -43,8 +45,8 @@ class MessageStreams:
             for channel in self._link.channels.values():
                 if HEARTBEAT_ID not in channel.intervals_ns:
                     self._send(channel, HEARTBEAT_ID)
-        if now_ns >= self._timesync_due_ns:
-            self._timesync_due_ns += _TIMESYNC_NS
+        if now_ns - self._timesync_ns >= self.timesync_ns:
+            self._timesync_ns = now_ns
             boot_ns = self._source.boot_clock_ns(now_ns)
             self._link.broadcast(dialect.MAVLink_timesync_message(0, boot_ns))
         for channel in self._link.channels.values():

@@ -74,6 +74,9 @@ class Sensors:
         if p.tilt_bias is not None:
             self._roll_bias, self._pitch_bias = p.tilt_bias
         self._roll_leak = self._pitch_leak = self._drifted_m = 0.0
+        self.aided = False
+        """The estimator is told of its motion: it does not take what its accelerometers feel for the
+        vertical."""
         self._yaw_drift = rng.uniform(-p.yaw_drift_radps, p.yaw_drift_radps)
         self._yaw_error = p.heading_offset_rad
         self._roll_wander = self._pitch_wander = self._baro_wander = self._climb_error = 0.0
@@ -94,6 +97,17 @@ class Sensors:
     @property
     def pitch_error_rad(self) -> float:
         return self._pitch_bias + self._pitch_wander + self._pitch_leak + self.fault.pitch_rad
+
+    @property
+    def drift_rad(self) -> tuple[float, float]:
+        """What of the errors of roll and pitch an estimator that is told of its motion can see: all but what
+        its accelerometers are wrong by for good."""
+        return self._roll_wander + self._roll_leak, self._pitch_wander + self._pitch_leak
+
+    def correct_tilt(self, roll_rad: float, pitch_rad: float) -> None:
+        """The estimator has found itself wrong: so much more roll and pitch."""
+        self._roll_leak += roll_rad
+        self._pitch_leak += pitch_rad
 
     @property
     def yaw_error_rad(self) -> float:
@@ -123,8 +137,9 @@ class Sensors:
     def _leak(self, dt_s: float, airframe: Airframe) -> None:
         """Rotors push along the body's axis, so the accelerometers feel level, but for the drag."""
         leak_s = self.params.leak_s
-        if leak_s is None or airframe.on_floor:
+        if airframe.on_floor:
             self._roll_leak = self._pitch_leak = 0.0
+        if leak_s is None or airframe.on_floor or self.aided:
             return
         cos, sin = math.cos(airframe.yaw_rad), math.sin(airframe.yaw_rad)
         wind, share = airframe.wind, airframe.params.drag_per_s / GRAVITY_MPS2

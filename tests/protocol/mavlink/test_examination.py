@@ -12,11 +12,16 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flightd.adapters.vehicle.mavlink.examination import Examination
+from flightd.adapters.vehicle.mavlink.examination import Examination, ExaminationReport
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
-from flightd.adapters.vehicle.mavlink.required_parameters import RULES, judge
+from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding, judge
+from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
+from flightd.adapters.vehicle.mavlink.pose_sharing import pose_use
+from flightd.adapters.vehicle.mavlink.required_parameters import RULES
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import too_slow
+from flightd.config.vehicle import PoseChoice
 from flightd.core.errors import UnavailableError
+from flightd.core.types import PoseUse
 from flightd.ports import Clock
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
@@ -48,18 +53,23 @@ async def examined(
         await asyncio.gather(serving, return_exceptions=True)
 
 
+def required(report: ExaminationReport) -> list[ParameterFinding]:
+    """Without what is only advised."""
+    return [finding for finding in report.findings if not finding.advised]
+
+
 def test_the_factory_settings_of_arducopter_are_named_and_mended() -> None:
     async def test() -> None:
         async with examined(ArduCopterPeer, **_FACTORY) as (peer, examination):
             report = await examination.report()
             assert report.firmware is Firmware.ARDUPILOT
             assert report.version == "4.5.6"
-            wrong = {finding.name for finding in report.findings}
+            wrong = {finding.name for finding in required(report)}
             assert wrong == {"GUID_TIMEOUT", "FS_GCS_TIMEOUT", "FS_THR_ENABLE", "BATT_FS_LOW_ACT"}
             assert "ARMING_SKIPCHK" in report.unread  # a name of 4.7
             assert await examination.fix(report.findings) == []
             assert peer.parameters["GUID_TIMEOUT"] == pytest.approx(0.3)
-            assert (await examination.report()).findings == ()
+            assert required(await examination.report()) == []
 
     virtual(test())
 
@@ -73,7 +83,7 @@ def test_a_copter_waits_a_second_at_most_for_a_companion_that_is_silent(timeout_
     async def test() -> None:
         async with examined(ArduCopterPeer, FS_GCS_TIMEOUT=timeout_s) as (peer, examination):
             report = await examination.report()
-            assert [finding.name for finding in report.findings] == ([] if fits else ["FS_GCS_TIMEOUT"])
+            assert [finding.name for finding in required(report)] == ([] if fits else ["FS_GCS_TIMEOUT"])
             assert await examination.fix(report.findings) == []
             assert peer.parameters["FS_GCS_TIMEOUT"] == pytest.approx(timeout_s if fits else 0.5)
 
@@ -85,13 +95,35 @@ def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:
         async with examined(Px4Peer, COM_OBL_RC_ACT=0, COM_RCL_EXCEPT=0) as (peer, examination):
             report = await examination.report()
             assert report.firmware is Firmware.PX4
-            found = {finding.name: finding.value for finding in report.findings}
+            found = {finding.name: finding.value for finding in required(report)}
             assert found == {"COM_OBL_RC_ACT": 0, "COM_RCL_EXCEPT": 0}
             (left,) = await examination.fix(report.findings)
             assert left.name == "COM_RCL_EXCEPT"  # a person must say whether there is RC
             assert peer.parameters["COM_OBL_RC_ACT"] == 4
 
     virtual(test())
+
+
+@pytest.mark.parametrize("choice", ["auto", "none", "odometry", "vision_position"])
+@pytest.mark.parametrize("firmware", list(Firmware))
+def test_what_our_motion_needs_is_advised_where_it_is_left_to_the_autopilot_else_required(
+    firmware: Firmware, choice: PoseChoice
+) -> None:
+    rules = pose_rules(firmware, choice, landing_target=False)
+    assert all(rule.advised is (choice == "auto") for rule in rules)
+    assert all(rule.better is not None and rule.fits(rule.better) for rule in rules)
+    assert all("\n" not in str(judge(rule, (rule.names[0], -7.0))) for rule in rules)
+    shipped = dict(shipped_parameters())[firmware]
+    if choice == "auto":
+        assert all(rule.fits(shipped[rule.names[0]]) for rule in rules)
+
+
+@pytest.mark.parametrize("bits", range(16))
+def test_px4_is_told_our_motion_where_it_takes_the_speed_and_neither_height_nor_heading(bits: int) -> None:
+    rules = pose_rules(Firmware.PX4, "auto", landing_target=False)
+    use = pose_use(rules, lambda names: (names[0], float(bits)))
+    assert use is (PoseUse.GIVEN if bits in {4, 5} else PoseUse.NOT_TAKEN)
+    assert pose_use(rules, lambda _: None) is PoseUse.UNKNOWN
 
 
 def test_sticks_that_px4_ignores_are_named_and_left_to_a_person() -> None:

@@ -18,7 +18,8 @@ from flightd.adapters.vehicle.mavlink.services.statustext import TextAssembler, 
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.geometry import wrap_pi
 from flightd.core.refusal import words
-from flightd.core.types import Demand, Event, EventLevel, GridPose
+from flightd.core.shared_pose import SharedPose
+from flightd.core.types import Attitude, Demand, Event, EventLevel
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.free_ports import free_port
 from flightd.sim.autopilot.autopilot import PeerConfig
@@ -143,18 +144,32 @@ def test_either_side_may_start_first() -> None:
 # Poses
 
 
-def test_the_grid_pose_is_shared_at_thirty_hertz_if_so_chosen() -> None:
+_TAKES = {"VISO_TYPE": 1.0, "EK3_SRC1_POSXY": 6.0, "EK3_SRC1_VELXY": 6.0}
+
+
+def taking(**other: float) -> ScriptedAutopilot:
+    """An ArduCopter whose parameters take our motion, but for the `other` ones."""
+    autopilot = ScriptedAutopilot()
+    autopilot.parameters.update(_TAKES | other)
+    return autopilot
+
+
+def test_the_motion_is_told_at_thirty_hertz_if_so_chosen_and_taken() -> None:
     async def test() -> None:
-        pose = GridPose(0, "A1", 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01,) * 9, 0.9)
+        pose = SharedPose(
+            0, Attitude(0, 0.0, 0.0, 0.0), 0.0, 1.0, 2.0, 0.0, 0.0, 1.5, (0.01, 0.01), (0.01, 0.01), 0.01, 0.9
+        )
         near, far = (pose.x_m + 0.4, pose.y_m), (pose.x_m + 4.0, pose.y_m)
-        for form, pad_m, expected, targets in (
-            (PoseForm.ODOMETRY, near, 60, 60),
-            (PoseForm.ODOMETRY, far, 60, 0),
-            (None, near, 0, 0),
+        for form, pad_m, expected, targets, other in (
+            (PoseForm.ODOMETRY, near, 60, 60, {}),
+            (PoseForm.ODOMETRY, far, 60, 0, {}),
+            (None, near, 0, 0, {}),
+            (PoseForm.ODOMETRY, near, 0, 0, {"VISO_TYPE": 0.0}),
+            (PoseForm.ODOMETRY, near, 0, 0, {"EK3_SRC1_YAW": 6.0}),
         ):
-            async with scripted(pose_form=form) as (autopilot, vehicle):
+            async with scripted(taking(**other), pose_form=form) as (autopilot, vehicle):
                 autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
-                await asyncio.sleep(0.1)
+                await asyncio.sleep(2.0)
                 for _ in range(100):
                     autopilot.say(dialect.MAVLink_distance_sensor_message(0, 5, 800, 150, 0, 0, 25, 0))
                     vehicle.share_pose(pose, pad_m)
@@ -167,11 +182,11 @@ def test_the_grid_pose_is_shared_at_thirty_hertz_if_so_chosen() -> None:
 
 def test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one() -> None:
     async def test() -> None:
-        for form in (PoseForm.ODOMETRY, None):
-            async with scripted(pose_form=form, origin_deg=(47.5, -8.25)) as (autopilot, _):
+        for form, other in ((PoseForm.ODOMETRY, {}), (None, {}), (PoseForm.ODOMETRY, {"VISO_TYPE": 0.0})):
+            async with scripted(taking(**other), pose_form=form, origin_deg=(47.5, -8.25)) as (autopilot, _):
                 await asyncio.sleep(9.0)
                 sent = autopilot.all("SET_GPS_GLOBAL_ORIGIN")
-                if form is None:
+                if form is None or other:
                     assert not sent
                     continue
                 assert len(sent) >= 2  # nobody answered

@@ -11,8 +11,8 @@ import pytest
 
 from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.parameter_rule import judge as judge_parameter
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for
-from flightd.adapters.vehicle.mavlink.required_parameters import judge as judge_parameter
 from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.config.camera import CameraConfig
 from flightd.config.recorder import RecorderConfig

@@ -46,6 +46,10 @@ class VehicleReport(msgspec.Struct, frozen=True):
     telemetry_age_s: Annotated[float, Meta(description="age of the newest attitude, s")]
     heartbeat_age_s: Annotated[float, Meta(description="age of the newest heartbeat, s")]
     refusal: Annotated[str, Meta(description="what the vehicle refused last and why, else empty")]
+    pose_use: Annotated[
+        str,
+        Meta(description="whether its estimator gets our motion: none, unknown (yet), not_taken or given"),
+    ] = "none"
 
 
 class LinkReport(msgspec.Struct, frozen=True):

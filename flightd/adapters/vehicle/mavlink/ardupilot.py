@@ -57,7 +57,13 @@ class ArduPilotVehicle(MavlinkVehicle):
         self._flies_raw = False
         self._origin: Origin | None = None
         if options.pose_form is not None:
-            self._origin = Origin(self.link, self._commander, options.system_id, options.origin_deg)
+            self._origin = Origin(
+                self.link,
+                self._commander,
+                options.system_id,
+                options.origin_deg,
+                lambda: self.gives_pose,
+            )
 
     def mode_name(self, custom_mode: int) -> str:
         return _MODE_NAMES.get(custom_mode, f"mode {custom_mode}")

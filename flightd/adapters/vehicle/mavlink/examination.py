@@ -15,13 +15,17 @@ from flightd.adapters.vehicle.mavlink.link.connection import Firmware, MavlinkLi
 from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.signing import Signing, setup_message
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
-from flightd.adapters.vehicle.mavlink.required_parameters import Job, ParameterFinding, judge, rules_for
+from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding, judge_all
+from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
+from flightd.adapters.vehicle.mavlink.pose_sharing import pose_use
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, advice_for, rules_for
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats
 from flightd.adapters.vehicle.mavlink.services.parameters import Parameters
 from flightd.adapters.vehicle.mavlink.telemetry import cells_told, range_sample, version_words
 from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.core.errors import UnavailableError
+from flightd.core.types import PoseUse
 from flightd.ports import Clock
 
 _BEATS_WINDOW_S = 1.0
@@ -43,6 +47,7 @@ class ExaminationReport:
     """The newest sample of each that looks down."""
     cells: int = 0
     """In series in the battery; 0 where it is not told."""
+    pose_use: PoseUse = PoseUse.NONE
 
 
 class Examination:
@@ -106,18 +111,12 @@ class Examination:
         answered."""
         firmware = self._link.firmware
         assert firmware is not None, "only while connected"
-        rules = rules_for(firmware, self._job)
+        rules = (*rules_for(firmware, self._job), *advice_for(firmware, self._job))
         self._parameters.forget()
         await self._commander.send(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-        findings, unread = [], []
-        for rule in rules:
-            found = await self._parameters.read(rule.names)
-            finding = judge(rule, found)
-            if finding is not None:
-                findings.append(finding)
-            if found is None:
-                unread.append(rule.names[-1])
-        if len(unread) == len(rules):
+        wanted = tuple(dict.fromkeys(rule.names for rule in rules))
+        unread = [names[-1] for names in wanted if await self._parameters.read(names) is None]
+        if len(unread) == len(wanted):
             remedy = "check the TX line"
             if self._signs and not self._has_key:
                 remedy = "it signs its messages: give its key as vehicle.signing_key"
@@ -128,12 +127,21 @@ class Examination:
             firmware,
             self._version,
             self._armed,
-            tuple(findings),
+            tuple(judge_all(rules, self._parameters.get)),
             tuple(unread),
             self._heartbeat_hz,
             tuple(self._ranges.values()),
             self._cells,
+            self._pose_use(firmware),
         )
+
+    def _pose_use(self, firmware: Firmware) -> PoseUse:
+        """What would become of our motion."""
+        job = self._job
+        if job.pose_output == "none":
+            return PoseUse.NONE
+        rules = pose_rules(firmware, job.pose_output, landing_target=job.landing_target)
+        return pose_use(rules, self._parameters.get)
 
     async def fix(self, findings: Sequence[ParameterFinding]) -> list[ParameterFinding]:
         """Write the better values and read them back; the findings that remain.  Nothing is written to

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
-from flightd.adapters.vehicle.mavlink.required_parameters import Names, ParameterFinding, Rule, judge
+from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding, Read, Rule, judge
 from flightd.adapters.vehicle.mavlink.services.commands import Answer
 from flightd.core.refusal import Refusal
-
-Read: TypeAlias = Callable[[Names], tuple[str, float] | None]
-"""What was read of a parameter: the name that answered and its value."""
 
 
 @dataclass(frozen=True, slots=True)

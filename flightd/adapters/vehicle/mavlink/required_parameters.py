@@ -6,31 +6,15 @@ where only a person can choose.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TypeAlias
+from dataclasses import dataclass, replace
 
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
-from flightd.config.vehicle import VehicleConfig
-
-Names: TypeAlias = tuple[str, ...]
-"""One parameter under the names it has had, oldest first."""
+from flightd.adapters.vehicle.mavlink.parameter_rule import Rule, has_bits, one_of, within
+from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
+from flightd.config.vehicle import PoseChoice, VehicleConfig
 
 FIRMWARES = {"ardupilot": Firmware.ARDUPILOT, "px4": Firmware.PX4, "mavsdk": Firmware.PX4}
 """By `vehicle.kind`, of those that have parameters."""
-
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """One parameter (under the names it has had), what it may be, in words too, and why."""
-
-    names: Names
-    fits: Callable[[float], bool]
-    expected: str
-    reason: str
-    better: float | None = None
-    optional: bool = False
-    """Versions that do not have it do as they should."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +27,7 @@ class Job:
     """ArduCopter flies in GUIDED, which wants an estimate of its motion."""
     raw_thrust: bool | None = None
     """What bit 3 of ArduCopter's GUID_OPTIONS must be; None: either."""
-    shares_pose: bool = False
+    pose_output: PoseChoice = "auto"
     landing_target: bool = False
     cells: int | None = None
     """In series in the battery; None: not known here."""
@@ -57,44 +41,18 @@ class Job:
             own_system_id=config.own_system_id,
             guided=config.flying_mode == "guided",
             raw_thrust=config.raw_thrust,
-            shares_pose=config.shares_pose,
+            pose_output=config.pose_output if config.shares_pose else "none",
             landing_target=config.landing_target,
             cells=cells,
             range_finder=config.range_finder,
         )
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterFinding:
-    """A parameter that is unsafe or wrong for this job."""
-
-    name: str
-    value: float
-    expected: str
-    reason: str
-    better: float | None
-
-    def __str__(self) -> str:
-        return f"{self.name} is {self.value:g}, expected {self.expected}: {self.reason}"
-
-
-def _one_of(*values: float) -> Callable[[float], bool]:
-    return lambda value: value in values
-
-
-def _within(low: float, high: float) -> Callable[[float], bool]:
-    return lambda value: low <= value <= high + 1e-6
-
-
-def _has_bits(bits: int) -> Callable[[float], bool]:
-    return lambda value: int(value) & bits == bits
-
-
 def _range_finder(sensor: int) -> tuple[Rule, ...]:
     reason = "the height above the floor comes from it"
     return (
         Rule((f"RNGFND{sensor + 1}_TYPE",), lambda value: value != 0, "a range finder", reason),
-        Rule((f"RNGFND{sensor + 1}_ORIENT",), _one_of(25), "25 (down)", reason, 25),
+        Rule((f"RNGFND{sensor + 1}_ORIENT",), one_of(25), "25 (down)", reason, 25),
     )
 
 
@@ -103,7 +61,7 @@ _CLIMB = "the climb rate shows a range finder that sticks: it must not come from
 _ARDUPILOT: tuple[Rule, ...] = (
     Rule(
         ("GUID_TIMEOUT",),
-        _within(0.1, 0.5),
+        within(0.1, 0.5),
         "0.3 to 0.5 s",
         "so long the last tilt is flown on after this computer has died",
         0.3,
@@ -114,33 +72,31 @@ _ARDUPILOT: tuple[Rule, ...] = (
         "0, or 8 for raw thrust",
         "the other bits change what setpoints mean",
     ),
-    Rule(
-        ("DISARM_DELAY",), _within(2, 30), "2 to 30 s", "an armed vehicle on the pad must disarm itself", 10
-    ),
+    Rule(("DISARM_DELAY",), within(2, 30), "2 to 30 s", "an armed vehicle on the pad must disarm itself", 10),
     Rule(
         ("FS_EKF_ACTION",),
-        _one_of(1, 3),
+        one_of(1, 3),
         "1 (land) or 3 (land in all modes)",
         "without position there is nothing else to fall back to",
         1,
     ),
     Rule(
         ("FS_GCS_ENABLE",),
-        _one_of(5),
+        one_of(5),
         "5 (land)",
         "else nothing lands the vehicle when this computer dies in flight",
         5,
     ),
     Rule(
         ("FS_GCS_TIMEOUT",),
-        _within(0.4, 1.0),
+        within(0.4, 1.0),
         "0.4 to 1 s",
         "so long, and up to 0.33 s more, it drifts, level, without anybody before it lands by itself",
         0.5,
     ),
     Rule(
         ("FS_THR_ENABLE",),
-        _one_of(0, 3),
+        one_of(0, 3),
         "3 (land), or 0 for flight without RC",
         "a return to launch needs a position",
         3,
@@ -151,34 +107,34 @@ _ARDUPILOT: tuple[Rule, ...] = (
         "bit 0 clear",
         "the receiver is ignored: no pilot could take over",
     ),
-    Rule(("BATT_FS_LOW_ACT",), _one_of(1), "1 (land)", "an empty battery must end in a landing", 1),
+    Rule(("BATT_FS_LOW_ACT",), one_of(1), "1 (land)", "an empty battery must end in a landing", 1),
     Rule(("BATT_LOW_VOLT",), lambda value: value > 0, "above 0 V", "else the battery failsafe never acts"),
-    Rule(("AHRS_EKF_TYPE",), _one_of(3), "3 (EKF3)", "the heights and attitudes used here are EKF3's", 3),
-    Rule(("EK3_ENABLE",), _one_of(1), "1", "EKF3 must run", 1),
-    Rule(("EK3_SRC1_POSXY",), _one_of(0, 6), "0 (none) or 6 (external)", "there is no GPS in the hall", 0),
+    Rule(("AHRS_EKF_TYPE",), one_of(3), "3 (EKF3)", "the heights and attitudes used here are EKF3's", 3),
+    Rule(("EK3_ENABLE",), one_of(1), "1", "EKF3 must run", 1),
+    Rule(("EK3_SRC1_POSXY",), one_of(0, 6), "0 (none) or 6 (external)", "there is no GPS in the hall", 0),
     Rule(
         ("EK3_SRC1_VELXY",),
-        _one_of(0, 5, 6),
+        one_of(0, 5, 6),
         "0 (none), 5 (flow) or 6 (external)",
         "there is no GPS in the hall",
         0,
     ),
-    Rule(("EK3_SRC1_POSZ",), _one_of(1), "1 (barometer)", _CLIMB, 1),
-    Rule(("EK3_SRC1_VELZ",), _one_of(0, 6), "0 (none) or 6 (external)", "there is no GPS in the hall", 0),
+    Rule(("EK3_SRC1_POSZ",), one_of(1), "1 (barometer)", _CLIMB, 1),
+    Rule(("EK3_SRC1_VELZ",), one_of(0, 6), "0 (none) or 6 (external)", "there is no GPS in the hall", 0),
     Rule(
         ("EK3_SRC1_YAW",),
-        _one_of(0, 1, 6),
+        one_of(0, 1, 6),
         "1 (compass), 0 (gyro) or 6 (external)",
         "there is no GPS in the hall",
         1,
     ),
-    Rule(("GPS1_TYPE", "GPS_TYPE"), _one_of(0), "0 (none)", "indoors a GPS reports nonsense", 0),
+    Rule(("GPS1_TYPE", "GPS_TYPE"), one_of(0), "0 (none)", "indoors a GPS reports nonsense", 0),
     *_range_finder(0),
     Rule(("ARMING_CHECK",), lambda value: value != 0, "1 (all)", "arming unchecked hides faults", 1),
-    Rule(("ARMING_SKIPCHK",), _one_of(0), "0 (none skipped)", "arming unchecked hides faults", 0),
+    Rule(("ARMING_SKIPCHK",), one_of(0), "0 (none skipped)", "arming unchecked hides faults", 0),
     Rule(
         ("LAND_SPEED",),
-        _within(70, 100),
+        within(70, 100),
         "70 to 100 cm/s",
         "a landing of last resort is blind: it drifts for as long as it takes (1 m/s is a drop of 5 cm)",
         90,
@@ -188,14 +144,14 @@ _ARDUPILOT: tuple[Rule, ...] = (
 _PX4: tuple[Rule, ...] = (
     Rule(
         ("COM_OF_LOSS_T",),
-        _within(0.2, 1.0),
+        within(0.2, 1.0),
         "0.5 to 1 s",
         "so long the last tilt and thrust are flown on after this computer has died",
         0.5,
     ),
     Rule(
         ("COM_OBL_RC_ACT",),
-        _one_of(4),
+        one_of(4),
         "4 (land)",
         "else nothing lands the vehicle when this computer dies: the default, Position, cannot be held"
         " without a position",
@@ -203,60 +159,53 @@ _PX4: tuple[Rule, ...] = (
     ),
     Rule(
         ("COM_RCL_EXCEPT",),
-        _has_bits(4),
+        has_bits(4),
         "bit 2 set (4)",
         "without RC the loss of RC must not end OFFBOARD",
     ),
     Rule(
         ("COM_RC_OVERRIDE",),
-        _has_bits(2),
+        has_bits(2),
         "bit 1 set (3)",
         "a pilot who moves the sticks must get the vehicle out of OFFBOARD",
         3,
     ),
     Rule(
         ("COM_RC_IN_MODE",),
-        _one_of(0, 1, 2, 3, 5, 6, 7, 8),
+        one_of(0, 1, 2, 3, 5, 6, 7, 8),
         "any of 0 to 8 but 4 (stick input disabled)",
         "the sticks are ignored: no pilot could take over",
     ),
-    Rule(("COM_DISARM_LAND",), _within(0.1, 20), "above 0 s", "a landed vehicle must disarm itself", 2),
+    Rule(("COM_DISARM_LAND",), within(0.1, 20), "above 0 s", "a landed vehicle must disarm itself", 2),
     Rule(
         ("COM_DISARM_PRFLT",),
-        _within(1, 30),
+        within(1, 30),
         "1 to 30 s",
         "an armed vehicle on the pad must disarm itself",
         10,
     ),
-    Rule(("MAV_FWDEXTSP",), _one_of(1), "1", "without it setpoints are not passed on", 1),
+    Rule(("MAV_FWDEXTSP",), one_of(1), "1", "without it setpoints are not passed on", 1),
     Rule(("COM_ARM_WO_GPS",), lambda value: value != 0, "1 or 2", "there is no GPS in the hall", 1),
-    Rule(("EKF2_GPS_CTRL",), _one_of(0), "0", "indoors a GPS reports nonsense", 0),
-    Rule(("EKF2_HGT_REF",), _one_of(0), "0 (barometer)", _CLIMB, 0),
-    Rule(("MPC_THR_HOVER",), _within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
+    Rule(("EKF2_GPS_CTRL",), one_of(0), "0", "indoors a GPS reports nonsense", 0),
+    Rule(("EKF2_HGT_REF",), one_of(0), "0 (barometer)", _CLIMB, 0),
+    Rule(("MPC_THR_HOVER",), within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
 )
 
 _LOW_CELL_V = (3.2, 3.7)
 _GUID_OPTIONS = "the thrust of our setpoints would be taken for something else (vehicle.raw_thrust)"
-_POSE = "the grid pose that is shared (vehicle.pose_output) is in the map's frame, its yaw too"
 
 _ARDUPILOT_GUIDED = (
     Rule(
         ("EK3_SRC1_VELXY",),
-        _one_of(5, 6),
+        one_of(5, 6),
         "5 (flow) or 6 (external)",
         "GUIDED needs an estimate of the motion (vehicle.flying_mode)",
     ),
 )
-_ARDUPILOT_POSE = (
-    Rule(("VISO_TYPE",), _one_of(1, 3), "1 (MAVLink) or 3 (VOXL)", "else the shared pose is not heard", 1),
-    Rule(("EK3_SRC1_POSXY",), _one_of(6), "6 (external)", _POSE, 6),
-    Rule(("EK3_SRC1_YAW",), _one_of(6), "6 (external)", _POSE, 6),
-)
 _ARDUPILOT_LANDING = (
-    Rule(("PLND_ENABLED",), _one_of(1), "1", "else the landing target is not heard", 1),
-    Rule(("PLND_TYPE",), _one_of(1), "1 (MAVLink)", "else the landing target is not heard", 1),
+    Rule(("PLND_ENABLED",), one_of(1), "1", "else the landing target is not heard", 1),
+    Rule(("PLND_TYPE",), one_of(1), "1 (MAVLink)", "else the landing target is not heard", 1),
 )
-_PX4_POSE = (Rule(("EKF2_EV_CTRL",), _has_bits(1 | 8), "bits 0 and 3 set (9: position and yaw)", _POSE, 9),)
 
 
 def _guid_options(raw: bool) -> Rule:
@@ -274,7 +223,7 @@ def _low_volt(cells: int) -> Rule:
     least, most = round(_LOW_CELL_V[0] * cells, 2), round(_LOW_CELL_V[1] * cells, 2)
     return Rule(
         ("BATT_LOW_VOLT",),
-        _within(least, most),
+        within(least, most),
         f"{least:g} to {most:g} V for {cells} cells (battery.cells)",
         "a threshold for fewer cells is never reached in time, one for more lands at once",
         round(3.5 * cells, 2),
@@ -284,7 +233,7 @@ def _low_volt(cells: int) -> Rule:
 def _cells_of(cells: int) -> Rule:
     return Rule(
         ("BAT1_N_CELLS", "BAT_N_CELLS"),
-        _one_of(cells),
+        one_of(cells),
         f"{cells} (battery.cells)",
         "the autopilot's own charge and low-battery landing go by it",
         cells,
@@ -294,7 +243,7 @@ def _cells_of(cells: int) -> Rule:
 def _supervised(own_system_id: int) -> Rule:
     return Rule(
         ("SYSID_MYGCS", "MAV_GCS_SYSID"),
-        _one_of(own_system_id),
+        one_of(own_system_id),
         f"{own_system_id} (vehicle.own_system_id)",
         "FS_GCS_ENABLE watches the heartbeats of that system, which must be this computer's alone",
         own_system_id,
@@ -327,22 +276,28 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
             extra += _ARDUPILOT_GUIDED
         if job.raw_thrust is not None:
             extra += (_guid_options(job.raw_thrust),)
-        if job.shares_pose:
-            extra += _ARDUPILOT_POSE
         if job.landing_target:
             extra += _ARDUPILOT_LANDING
-    else:
-        if job.cells is not None:
-            extra += (_cells_of(job.cells),)
-        if job.shares_pose:
-            extra += _PX4_POSE
-    stricter = {rule.names: rule for rule in extra}
+    elif job.cells is not None:
+        extra += (_cells_of(job.cells),)
+    extra += pose_rules(firmware, job.pose_output, landing_target=job.landing_target)
+    stricter = {rule.names: rule for rule in extra if not rule.advised}
     other = job.range_finder if firmware is Firmware.ARDUPILOT else None
     if other is not None:
         pairs = zip(_range_finder(0), _range_finder(other), strict=True)
         stricter |= {first.names: rule for first, rule in pairs}
-    table = [stricter.pop(rule.names, rule) for rule in RULES[firmware]]
+    better = {rule.names: rule.better for rule in extra}
+    table = [
+        stricter.pop(rule.names, replace(rule, better=better.get(rule.names, rule.better)))
+        for rule in RULES[firmware]
+    ]
     return (*table, *stricter.values())
+
+
+def advice_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
+    """What the autopilot has to be set to beyond them to take our motion, where it is left to it."""
+    rules = pose_rules(firmware, job.pose_output, landing_target=job.landing_target)
+    return tuple(rule for rule in rules if rule.advised)
 
 
 _WAY_DOWN = frozenset(
@@ -356,11 +311,3 @@ _WAY_DOWN = frozenset(
 def way_down_rules(rules: tuple[Rule, ...]) -> tuple[Rule, ...]:
     """Those by which the autopilot itself levels and lands when this computer dies."""
     return tuple(rule for rule in rules if _WAY_DOWN.intersection(rule.names))
-
-
-def judge(rule: Rule, found: tuple[str, float] | None) -> ParameterFinding | None:
-    """What is wrong with a parameter as it was read; None when nothing is, or it does not exist."""
-    if found is None or rule.fits(found[1]):
-        return None
-    name, value = found
-    return ParameterFinding(name, value, rule.expected, rule.reason, rule.better)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import abc
 import asyncio
 import logging
-import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
@@ -18,16 +17,12 @@ from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.signing import Signing
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
-from flightd.adapters.vehicle.mavlink.pose_output import PoseForm, PoseOutput, landing_target
+from flightd.adapters.vehicle.mavlink.parameter_rule import Names, ParameterFinding, judge_all
+from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
+from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
+from flightd.adapters.vehicle.mavlink.pose_sharing import PoseSharing
 from flightd.adapters.vehicle.mavlink.refusal import SharedSystemId, WrongFirmware, not_set_up
-from flightd.adapters.vehicle.mavlink.required_parameters import (
-    Job,
-    Names,
-    ParameterFinding,
-    judge,
-    rules_for,
-    way_down_rules,
-)
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, advice_for, rules_for, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.commands import Commander
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, BeatPoll, Beats, too_slow
@@ -38,13 +33,14 @@ from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry, version_words
 from flightd.core.refusal import Refusal
+from flightd.core.shared_pose import SharedPose
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
     Demand,
     Event,
     EventLevel,
-    GridPose,
+    PoseUse,
     VehicleState,
 )
 from flightd.ports import Clock
@@ -66,14 +62,12 @@ RATES_HZ: dict[int, float] = {
 _BEATS_SETTLE_S, _BEATS_WINDOW_S, _BEATS_CHECK_S = 5.0, 3.0, 1.0
 _EXAMINE_S, _EXAMINE_AGAIN_S = 0.5, 10.0
 _VERSION_LOOKS, _VERSION_S = 3, 0.2
-_PAD_NEAR_M = 1.0
-"""Further away the pad is not shown: a landing of last resort must not set out for it."""
 
 
 @dataclass(frozen=True, slots=True)
 class MavlinkOptions:
     """The vehicle's `system_id`, what its parameters have to be set up for (`job`), the key of a signed link,
-    the form in which the grid pose is given to the autopilot's estimator (None: not at all), and latitude and
+    the form in which the autopilot's estimator is told of our motion (None: not at all), and latitude and
     longitude for an estimator that has to have some."""
 
     system_id: int = 1
@@ -112,15 +106,14 @@ class MavlinkVehicle(abc.ABC):
     """Whether its failsafe goes by the heartbeats of one system, which has to be this computer alone."""
 
     def __init__(self, url: str, clock: Clock, options: MavlinkOptions = DEFAULTS) -> None:
-        system_id = options.system_id
+        system_id, job = options.system_id, options.job
         self._clock = clock
-        self._system_id, self._own_system_id = system_id, options.job.own_system_id
+        self._system_id, self._own_system_id = system_id, job.own_system_id
         self._sync = ClockSync()
-        self._telemetry = MavlinkTelemetry(self._sync, self.climb_from, options.job.range_finder)
-        self._pose_output = None if options.pose_form is None else PoseOutput(options.pose_form)
+        self._telemetry = MavlinkTelemetry(self._sync, self.climb_from, job.range_finder)
         transport = make_transport(parse_endpoint(url), options.opener)
         codec = Codec(system_id, signing=options.signing)
-        beats = Codec(options.job.own_system_id, signing=options.signing) if self.watches_beats else codec
+        beats = Codec(job.own_system_id, signing=options.signing) if self.watches_beats else codec
         self.link = MavlinkLink(transport, codec, clock, system_id, self._received, beats)
         self._commander = Commander(self.link, system_id)
         self._modes = ModeArmingManager(self, self._commander, self._telemetry, clock)
@@ -129,10 +122,13 @@ class MavlinkVehicle(abc.ABC):
         self.parameters = Parameters(self.link, system_id, bytewise=self.firmware is Firmware.PX4)
         self._texts = TextAssembler()
         self._text_id = 0
-        self._rules = rules_for(self.firmware, options.job)
+        self._rules, self._advice = rules_for(self.firmware, job), advice_for(self.firmware, job)
+        taken = pose_rules(self.firmware, job.pose_output, landing_target=job.landing_target)
+        self._pose = PoseSharing(options.pose_form, self.firmware, taken, self.parameters.get)
         self._way_down = way_down_rules(self._rules)
         self._examined = False
         """All that the autopilot answers of its parameters was read."""
+        self._told_use = PoseUse.NONE
         self._reboots = 0
         self._version = ""
         self._heard = asyncio.Event()
@@ -175,7 +171,9 @@ class MavlinkVehicle(abc.ABC):
             in_control=self._modes.in_control,
             refusal=self._modes.refusal,
         )
-        known = state and replace(state, unfit=self._modes.unfit, keeps_climb=self.keeps_climb())
+        known = state and replace(
+            state, unfit=self._modes.unfit, keeps_climb=self.keeps_climb(), pose_use=self._pose.use
+        )
         return known and self._steering.climb_of(known, now_ns)
 
     def attitudes(self) -> list[Attitude]:
@@ -204,18 +202,20 @@ class MavlinkVehicle(abc.ABC):
         """Messages that the link could not take."""
         return self.link.dropped
 
-    def share_pose(self, pose: GridPose, pad_m: tuple[float, float] | None = None) -> None:
-        """Give the autopilot's estimator the grid pose, at 30 Hz at most, if a `pose_form` was chosen; with
-        `pad_m`, a place on the map, also the target of its precision landing while it is near."""
+    def share_pose(self, pose: SharedPose | None, pad_m: tuple[float, float] | None = None) -> None:
+        """Tell the autopilot's estimator of the motion, at 30 Hz at most, if a `pose_form` was chosen and it
+        takes it; with `pad_m`, a place on the map, also the target of its precision landing while it is
+        near."""
         now_ns = self._clock.now_ns()
-        attitude, height_m = self._telemetry.attitude, self._telemetry.height_m(now_ns)
-        if self._pose_output is None or attitude is None:
-            return
-        message = self._pose_output.make(now_ns, pose, attitude, height_m, self._telemetry.climb_mps(now_ns))
-        if message is not None:
-            self.link.send(message)
-            if pad_m is not None and math.dist(pad_m, (pose.x_m, pose.y_m)) < _PAD_NEAR_M:
-                self.link.send(landing_target(self.firmware, pose, attitude, pad_m, height_m))
+        state = self._telemetry.state(now_ns, "", in_control=False, refusal=None)
+        if state is not None:
+            for message in self._pose.messages(now_ns, state, pose, pad_m):
+                self.link.send(message)
+
+    @property
+    def gives_pose(self) -> bool:
+        """Whether the autopilot's estimator is told of the motion."""
+        return self._pose.use is PoseUse.GIVEN
 
     # For who looks after it on the ground
 
@@ -226,8 +226,7 @@ class MavlinkVehicle(abc.ABC):
 
     def findings(self) -> list[ParameterFinding]:
         """The parameters that are wrong for the job, of those that were read."""
-        judged = (judge(rule, self.parameters.get(rule.names)) for rule in self._rules)
-        return [finding for finding in judged if finding is not None]
+        return judge_all((*self._rules, *self._advice), self.parameters.get)
 
     async def set_right(self, finding: ParameterFinding) -> bool:
         """Write its better value; True when it read back as written.  An armed vehicle is left as it is."""
@@ -336,12 +335,14 @@ class MavlinkVehicle(abc.ABC):
 
     async def _read_parameters(self) -> None:
         """Those by which it is flown; the rest is read on the ground, by the examination."""
-        await self.parameters.keep(self.parameter_names, self.required_names)
+        advised = tuple(rule.names for rule in self._advice if not rule.optional)
+        await self.parameters.keep((*self.parameter_names, *advised), self.required_names)
 
     async def _examine(self) -> None:
         """Read all that the doctor would look at, again and again on the ground; what this version does not
         have is never answered."""
-        names = tuple(dict.fromkeys(rule.names for rule in (*self._way_down, *self._rules)))
+        rules = (*self._way_down, *self._rules, *self._advice)
+        names = tuple(dict.fromkeys(rule.names for rule in rules))
         while True:
             if not self._telemetry.armed:
                 reboots = self._reboots
@@ -349,8 +350,20 @@ class MavlinkVehicle(abc.ABC):
                     await self.parameters.read_again(names)
                 await self.parameters.read_all(names)
                 self._examined = reboots == self._reboots
+                self._tell_pose_use()
             complete = all(rule.optional or self.parameters.get(rule.names) for rule in self._way_down)
             await asyncio.sleep(_EXAMINE_AGAIN_S if self._examined and complete else _EXAMINE_S)
+
+    def _tell_pose_use(self) -> None:
+        """Tell people whenever the autopilot's estimator begins or ceases to take our motion."""
+        before, self._told_use = self._told_use, self._pose.use
+        if self._told_use is before or self._told_use is PoseUse.NONE:
+            return
+        given = self._told_use is PoseUse.GIVEN
+        text = "its estimator takes our motion" if given else "its estimator does not take our motion"
+        _LOG.info("%s", text)
+        level = EventLevel.INFO if given else EventLevel.WARNING
+        self.notify(Event(self._clock.now_ns(), level, "pose_output", text))
 
     async def _mind_beats(self) -> None:
         """Tell people once, when the heartbeats stay too far apart to see a take-over in time."""

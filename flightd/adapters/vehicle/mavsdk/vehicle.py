@@ -29,8 +29,9 @@ from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
 from flightd.adapters.vehicle.mavlink.mode_manager import ModeArmingManager
+from flightd.adapters.vehicle.mavlink.parameter_rule import Names
 from flightd.adapters.vehicle.mavlink.refusal import BeyondLibrary, WrongSystemId, not_set_up
-from flightd.adapters.vehicle.mavlink.required_parameters import Job, Names, rules_for, way_down_rules
+from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for, way_down_rules
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ASK_FAST_S, ASK_S, ClockSync
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BeatPoll
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper

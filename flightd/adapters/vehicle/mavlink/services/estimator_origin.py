@@ -7,6 +7,7 @@ however good.  Any plausible place will do: an origin that is set already stays.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -18,13 +19,18 @@ _AGAIN_S = 2.0
 
 
 class Origin:
-    """Sends the origin until the autopilot reports one, and again after it rebooted."""
+    """Sends the origin until the autopilot reports one, and again after it rebooted, while it is `wanted`."""
 
     def __init__(
-        self, link: MavlinkLink, commander: Commander, system_id: int, place_deg: tuple[float, float]
+        self,
+        link: MavlinkLink,
+        commander: Commander,
+        system_id: int,
+        place_deg: tuple[float, float],
+        wanted: Callable[[], bool],
     ) -> None:
         """`place_deg` is latitude and longitude."""
-        self._link = link
+        self._link, self._wanted = link, wanted
         self._commander = commander
         self._system_id = system_id
         self._place = round(place_deg[0] * 1e7), round(place_deg[1] * 1e7)
@@ -42,7 +48,7 @@ class Origin:
     async def run(self) -> None:
         """Keep it set until cancelled; started when the autopilot is heard."""
         while True:
-            if not self.is_set:
+            if not self.is_set and self._wanted():
                 self._link.send(
                     dialect.MAVLink_set_gps_global_origin_message(self._system_id, *self._place, 0, 0)
                 )

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.link.connection import MavlinkLink
-from flightd.adapters.vehicle.mavlink.required_parameters import Names
+from flightd.adapters.vehicle.mavlink.parameter_rule import Names
 
 _ANSWER_S = 0.4
 _ATTEMPTS = 3

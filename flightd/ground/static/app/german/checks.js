@@ -3,6 +3,10 @@ export default {
   // their names
   "vehicle": "Fluggerät",
   "parameter": "Parameter",
+  "pose": "Position",
+  "the autopilot's estimator takes our motion": "der Schätzer des Autopiloten nimmt unsere Bewegung an",
+  "the autopilot's estimator does not take our motion": "der Schätzer des Autopiloten nimmt unsere Bewegung nicht an",
+  "set what is named of its parameters": "stellen Sie ein, was von seinen Parametern genannt ist",
   "camera": "Kamera",
   "exposure": "Belichtung",
   "front exposure": "Belichtung vorn",
