@@ -267,8 +267,10 @@ class StateEstimator:
             carried.by_width(exposed_ns, by_width_m, climbed_m)
         if measured_m < _CLIMB_DOUBT_M and not self.climb.found:
             self.climb.forget()
-        elif used and by_width_m is not None and math.isfinite(measured_m + climbed_m):
-            self.climb.step(exposed_ns, measured_m, by_width_m, climbed_m)
+        elif used and by_width_m is not None and math.isfinite(climbed_m):
+            # without a range finder the lines alone contradict it: such a drone lands anyhow
+            range_m = measured_m if math.isfinite(measured_m) else by_width_m
+            self.climb.step(exposed_ns, range_m, by_width_m, climbed_m)
             if self.climb.found:
                 carried.forget()
 

@@ -28,8 +28,9 @@ _DEMANDS = {
 """Of the vehicle, while nothing is flown."""
 _BY_PAD = {Phase.TAKE_OFF, Phase.ACQUIRE, Phase.HOLD}
 _TO_GOAL = (Phase.FOLLOW, Phase.HOVER)
-_SETTLE_S = 3.0
-"""The most that a landing waits for the drone to come to rest."""
+_SETTLE_S, _SETTLE_UNMEASURED_S = 3.0, 0.6
+"""The most that a landing waits for the drone to come to rest, and where no height tells whether it stays at
+that."""
 _REST_MPS = 0.15
 # the autopilots themselves say after a second that they stand
 _OWN_LANDING_S, _DISARM_S = 2.5, 5.5
@@ -188,7 +189,8 @@ class ReferenceGenerator:
         self._still_s = self._standstill.step(s, sinks=self._sinks)
         self._sinks = False
         moving = self._steers and s.speed_mps > _REST_MPS and not self._standstill.touches
-        if moving and not task.state.on_pad and task.phase_s < _SETTLE_S:
+        settle_s = _SETTLE_UNMEASURED_S if math.isnan(s.height_m) else _SETTLE_S
+        if moving and not task.state.on_pad and task.phase_s < settle_s:
             self._height.reset(self._height.position)
             return 0.0, Demand.FLY
         rate = self._touchdown.rate_mps(s, _target(s, task))
