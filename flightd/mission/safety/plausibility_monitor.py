@@ -25,6 +25,9 @@ _BOTH_SHARE, _SCALE_SHARE = 0.085, 0.065
 """It is wrong, too, where width and scale are both off by more: lengths on the floor do not come out as the
 map and the motion have them.  A focal length alone errs by less (`SensorPriors.scale_share`); a creep that
 swings of a stuck reading hide shows in both."""
+_AGREED_SHARE, _AGREED_S = 0.1, 0.5
+"""A height that was doubted is believed again once the lines agree with it so well for so long: where they are
+few, the width of another line lies in between."""
 _KNOWN_M = 0.3
 """A position less certain than this (standard deviation) cannot tell whether the corridor is left."""
 
@@ -40,6 +43,7 @@ class PlausibilityMonitor:
         self._tick_s = 0.02
         self._off_m = 0.0
         self._doubt = False
+        self._agreed_s = 0.0
         self.oscillation = OscillationMonitor()
         self.push_mps2 = (0.0, 0.0)
         """The mean push of the last seconds in which lines were seen, map axes."""
@@ -66,6 +70,8 @@ class PlausibilityMonitor:
         is_off = off_share > self._height_share or (off_m > _OFF_M and off_share > _OFF_SHARE)
         is_off = is_off or _both_off(1.0 - tracker.height_share, tracker.scale_share)
         highest_m = max(height_m, height_m - tracker.height_off_m)  # one that sticks near the floor is low
+        self._agreed_s = self._agreed_s + dt_s if off_share < _AGREED_SHARE else 0.0
+        is_off = is_off or (self._doubt and self._agreed_s < _AGREED_S)
         self._doubt = is_off and highest_m > self._judged_above_m
         if tracks is not None and now_ns - max(tracks.lines_ns, min(tracks.features_ns)) < _FRESH_NS:
             part = min(dt_s / _PUSH_MEMORY_S, 1.0)

@@ -54,6 +54,15 @@ def test_a_height_that_width_and_scale_both_contradict_is_doubted(
     assert warnings.height_doubted is doubted
 
 
+def test_a_height_that_was_doubted_is_believed_again_only_once_the_lines_agree_for_a_while() -> None:
+    monitor = PlausibilityMonitor(SITE, configured())
+    steps = [(0.7, 0.1, True), (0.82, 2.0, True), (0.95, 0.3, True), (0.82, 0.1, True), (0.95, 0.6, False)]
+    for share, lasts_s, doubted in steps:
+        for _ in range(round(lasts_s / 0.02)):
+            warnings = monitor.step(0, 0.02, None, 1.5, None, _Seen(share, 0.0), FrameMonitor(), HEALTHY)
+        assert warnings.height_doubted is doubted
+
+
 class _Seen(LineTracker):
     """What lines and motion say of the told height."""
 
