@@ -26,8 +26,8 @@ _BOTH_SHARE, _SCALE_SHARE = 0.085, 0.065
 map and the motion have them.  A focal length alone errs by less (`SensorPriors.scale_share`); a creep that
 swings of a stuck reading hide shows in both."""
 _AGREED_SHARE, _AGREED_S = 0.1, 0.5
-"""A height that was doubted is believed again once the lines agree with it so well for so long: where they are
-few, the width of another line lies in between."""
+"""A height that was doubted is believed again once the lines agree with it so well for so long: where they
+are few, the width of another line lies in between."""
 _KNOWN_M = 0.3
 """A position less certain than this (standard deviation) cannot tell whether the corridor is left."""
 
