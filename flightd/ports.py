@@ -55,7 +55,7 @@ class Vehicle(Protocol):
 
 @runtime_checkable
 class PoseTaker(Protocol):
-    """A vehicle whose own estimator can use the grid pose."""
+    """A vehicle whose own estimator can be told of our motion."""
 
     def share_pose(self, pose: SharedPose | None, pad_m: tuple[float, float] | None = None) -> None:
         """At each tick: what a new frame tells of the motion, None where there is none or it tells nothing;

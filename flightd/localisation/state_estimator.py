@@ -265,12 +265,12 @@ class StateEstimator:
         used, by_width_m = self.tracker.frame(lines, height_m, error_m), self.tracker.by_width_m
         if used and by_width_m is not None:
             carried.by_width(exposed_ns, by_width_m, climbed_m)
-        if measured_m < _CLIMB_DOUBT_M and not self.climb.found:
+        # without a range finder the lines alone contradict the climb: such a drone lands anyhow
+        told_m = by_width_m if math.isnan(measured_m) else measured_m
+        if told_m is not None and told_m < _CLIMB_DOUBT_M and not self.climb.found:
             self.climb.forget()
-        elif used and by_width_m is not None and math.isfinite(climbed_m):
-            # without a range finder the lines alone contradict it: such a drone lands anyhow
-            range_m = measured_m if math.isfinite(measured_m) else by_width_m
-            self.climb.step(exposed_ns, range_m, by_width_m, climbed_m)
+        elif used and told_m is not None and by_width_m is not None and math.isfinite(climbed_m):
+            self.climb.step(exposed_ns, told_m, by_width_m, climbed_m)
             if self.climb.found:
                 carried.forget()
 

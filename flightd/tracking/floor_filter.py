@@ -348,7 +348,9 @@ class FloorFilter:
         """What was followed as two lines is one, and lies where the new one was seen."""
         row = self._between(new, old)
         errors, noise = np.array([float(row @ self._x)]), np.array([[_SAME_LINE_M**2]])
-        self._x, self._p, _ = corrected(self._x, self._p, row[None, :], errors, noise)
+        # a dead-reckoned line tells of the motion, not of the sensors
+        self._x, self._p, _ = corrected(self._x, self._p, row[None, :], errors, noise, _BUT_MOTION)
+        self._bound_push()
         kept, found = self.held[old], self.held[new]
         kept.seen_ns, kept.hits, kept.width_m = found.seen_ns, kept.hits + found.hits, found.width_m
         kept.from_m, kept.to_m = found.from_m, found.to_m
@@ -441,13 +443,17 @@ class FloorFilter:
         outlying = np.maximum(np.abs(errors) / np.sqrt(expected) / _OUTLIER_SIGMAS, 1.0)
         noise[np.diag_indices(len(noise))] += (outlying - 1.0) * expected
         self._x, self._p, spread = corrected(self._x, self._p, rows, errors, noise, unmoved)
-        push, delay_s = self._noise.max_disturbance_mps2, _MOST_SIGMAS * self._priors.delay_s
-        self._bound(PUSH_X, -push, push)
-        self._bound(PUSH_Y, -push, push)
+        delay_s = _MOST_SIGMAS * self._priors.delay_s
+        self._bound_push()
         self._bound(LEAK, 0.0, _MOST_LEAK_PER_S)
         self._bound(DELAY, -delay_s, min(delay_s, self._latency_s))  # no frame arrives before it is exposed
         if minded:
             self._mind(errors / np.sqrt(np.diag(spread)), measured.axes)
+
+    def _bound_push(self) -> None:
+        most = self._noise.max_disturbance_mps2
+        self._bound(PUSH_X, -most, most)
+        self._bound(PUSH_Y, -most, most)
 
     def _bound(self, index: int, least: float, most: float) -> None:
         self._x[index] = min(max(self._x[index], least), most)

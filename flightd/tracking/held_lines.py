@@ -12,7 +12,7 @@ _LEAST_SHARE = 0.3
 """Of the gate: so near a line is taken for one held however sure both are."""
 SURE_HITS = 3
 """A line seen so often is surely one."""
-_LOST_NS = 250_000_000
+_LOST_NS, _NEW_HITS = 250_000_000, 10
 """What is found where a line should be that was not seen for longer is taken for that once it is surely a
 line: a stain that shows for a frame would else tell where the drone is, and how fast."""
 
@@ -85,7 +85,7 @@ def refound(
     they are from each other, and the standard deviation of that."""
     pairs: list[tuple[int, int]] = []
     for new in seen:
-        if held[new].hits != SURE_HITS:
+        if not SURE_HITS <= held[new].hits <= _NEW_HITS:
             continue
         best, least_m = None, gate_m
         for old, line in enumerate(held):

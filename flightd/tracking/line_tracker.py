@@ -162,6 +162,11 @@ class LineTracker:
         return self._widths.by_width_m
 
     @property
+    def widths_tell(self) -> bool:
+        """The lines of the newest frame tell a height by their width, and so do those before, steadily."""
+        return self._widths.tell
+
+    @property
     def newest_ns(self) -> int:
         """The exposure of the newest frame taken; 0 before the first."""
         return self._stamp_ns

@@ -41,6 +41,11 @@ class WidthHeights:
         return self._share if self._changes < _STEADY else 1.0
 
     @property
+    def tell(self) -> bool:
+        """The newest frame's widths could be held against a height, and lately they agree with each other."""
+        return self.by_width_m is not None and self._changes < _STEADY
+
+    @property
     def off_m(self) -> float:
         """How much higher the height was told last than the widths have it, by that share, m."""
         return self._told_m - self._told_m / self.share

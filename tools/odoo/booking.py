@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,9 @@ from flightd.core.errors import RunError, cannot_write
 from flightd.core.utc_time import utc_text
 from tools.odoo.odoo import Odoo
 from tools.odoo.plan import Booking, Plan
+
+_ROUNDED = 1e-6
+"""Quantities are decimals that Odoo rounds by the unit's precision."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +75,8 @@ def _book(odoo: Odoo, booking: Booking, approval: Approval) -> tuple[int, ...]:
         quants = (odoo.new_counted(made.location, made.product, made.lot, booking.counted),)
     else:
         odoo.set_counted(quants, booking.counted)
-    if odoo.differences(quants) != booking.counted - booking.books:
+    wanted = booking.counted - booking.books
+    if not math.isclose(odoo.differences(quants), wanted, abs_tol=_ROUNDED):
         odoo.clear_counted(quants)
         raise RunError("Odoo's stock has changed meanwhile, nothing was booked", remedy="make a new plan")
     if approval.applies:

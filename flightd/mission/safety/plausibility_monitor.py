@@ -70,7 +70,10 @@ class PlausibilityMonitor:
         is_off = off_share > self._height_share or (off_m > _OFF_M and off_share > _OFF_SHARE)
         is_off = is_off or _both_off(1.0 - tracker.height_share, tracker.scale_share)
         highest_m = max(height_m, height_m - tracker.height_off_m)  # one that sticks near the floor is low
-        self._agreed_s = self._agreed_s + dt_s if off_share < _AGREED_SHARE else 0.0
+        if is_off or off_share >= _AGREED_SHARE:
+            self._agreed_s = 0.0
+        elif tracker.widths_tell:
+            self._agreed_s += dt_s
         is_off = is_off or (self._doubt and self._agreed_s < _AGREED_S)
         self._doubt = is_off and highest_m > self._judged_above_m
         if tracks is not None and now_ns - max(tracks.lines_ns, min(tracks.features_ns)) < _FRESH_NS:

@@ -124,11 +124,23 @@ def test_the_way_is_sent_in_the_autopilots_own_heading() -> None:
 def test_a_correction_on_the_map_is_no_way_flown_but_is_counted() -> None:
     out, pose = output(), replace(POSE, vx_mps=0.0, vy_mps=0.0)
     out.make(0, pose, 0.0)
-    out.make(FRAME_NS, at(pose, 1, 14.0, 3.0), 0.0)  # the jump by itself
-    message = out.make(2 * FRAME_NS, replace(at(pose, 2, 14.0, 3.1), corrections=1), 0.0)
+    out.make(2 * FRAME_NS, at(pose, 1, 14.0, 3.0), 0.0)  # the jump by itself
+    message = out.make(4 * FRAME_NS, replace(at(pose, 2, 14.0, 3.1), corrections=1), 0.0)
     assert message is not None
     assert message.reset_counter == out.resets == 2
     assert (message.x, message.y) == (0.0, 0.0)
+
+
+def test_a_gap_in_what_goes_out_is_counted_though_poses_came() -> None:
+    """ArduPilot hears nothing of a frame that tells one axis alone."""
+    out = output(Firmware.ARDUPILOT)
+    out.make(0, POSE, 0.0)
+    for frame in range(1, 40):
+        half = replace(at(POSE, frame, 12.0, 3.0), speed_variances=(0.01, math.nan))
+        assert out.make(frame * FRAME_NS, half, 0.0) is None
+    message = out.make(41 * FRAME_NS, at(POSE, 41, 12.0, 3.0), 0.0)
+    assert message is not None
+    assert message.reset_counter == 1
 
 
 def test_a_gap_is_counted_and_so_is_the_end_of_a_flight() -> None:

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import math
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
+from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
+from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
+from flightd.adapters.vehicle.mavlink.pose_sharing import PoseSharing, pose_use
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
-from flightd.config.vehicle import VehicleConfig
+from flightd.config.vehicle import PoseChoice, VehicleConfig
 from flightd.core.shared_pose import SharedPose
-from flightd.core.types import Demand, PoseUse
+from flightd.core.types import Attitude, Demand, LandedState, PoseUse, VehicleState
 from flightd.ports import PoseTaker
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig
@@ -137,3 +142,54 @@ def test_arducopter_that_waits_for_our_motion_is_not_armed_without() -> None:
             assert "VisOdom: not healthy" in str(rig.known().refusal)
 
     virtual(test())
+
+
+@pytest.mark.parametrize("choice", ["auto", "odometry"])
+def test_what_sharing_needs_is_known_whether_it_is_advised_or_demanded(choice: PoseChoice) -> None:
+    """An examination waits for the ground; one found flying is told of its motion all the same."""
+    rules = pose_rules(Firmware.ARDUPILOT, choice, landing_target=False)
+    sharing = PoseSharing(PoseForm.ODOMETRY, Firmware.ARDUPILOT, rules, lambda _: None)
+    assert ("EK3_SRC1_VELXY",) in sharing.needed_names
+    assert ("VISO_DELAY_MS",) not in sharing.needed_names
+    assert not PoseSharing(None, Firmware.ARDUPILOT, rules, lambda _: None).needed_names
+
+
+def test_a_delay_that_is_read_and_wrong_keeps_the_motion_back() -> None:
+    rules = pose_rules(Firmware.ARDUPILOT, "auto", landing_target=False)
+    values = {name: float(rule.better or 0) for rule in rules for name in rule.names}
+    assert pose_use(rules, read_of(values)) is PoseUse.GIVEN
+    values["VISO_DELAY_MS"] = 10.0
+    assert pose_use(rules, read_of(values)) is PoseUse.NOT_TAKEN
+    del values["VISO_DELAY_MS"]
+    assert pose_use(rules, read_of(values)) is PoseUse.GIVEN
+
+
+@pytest.mark.parametrize(
+    ("before", "height_m", "stands"),
+    [
+        (LandedState.ON_GROUND, math.nan, True),  # not off the floor yet
+        (LandedState.IN_AIR, math.nan, False),  # it sinks with little thrust, unmeasured
+        (LandedState.IN_AIR, 0.1, True),
+        (LandedState.IN_AIR, 0.8, False),
+    ],
+)
+def test_one_that_flew_stands_only_where_its_height_says_so(
+    before: LandedState, height_m: float, stands: bool
+) -> None:
+    rules = pose_rules(Firmware.PX4, "odometry", landing_target=False)
+    values = {name: float(rule.better or 0) for rule in rules for name in rule.names}
+    sharing = PoseSharing(PoseForm.ODOMETRY, Firmware.PX4, rules, read_of(values))
+    list(sharing.messages(0, told(before, 1.0), None, None))
+    now_ns = 1_000_000_000
+    sent = list(sharing.messages(now_ns, told(LandedState.ON_GROUND, height_m), None, None))
+    assert bool(sent) is stands
+
+
+def read_of(values: dict[str, float]) -> Callable[[tuple[str, ...]], tuple[str, float] | None]:
+    return lambda names: (names[0], values[names[0]]) if names[0] in values else None
+
+
+def told(landed: LandedState, height_m: float) -> VehicleState:
+    """An armed vehicle's state."""
+    level = Attitude(0, 0.0, 0.0, 0.0)
+    return VehicleState(level, height_m, 0, 0.0, "GUIDED", True, True, landed, 0.9, 12.0, 0)

@@ -56,19 +56,27 @@ def test_a_height_that_width_and_scale_both_contradict_is_doubted(
 
 def test_a_height_that_was_doubted_is_believed_again_only_once_the_lines_agree_for_a_while() -> None:
     monitor = PlausibilityMonitor(SITE, configured())
-    steps = [(0.7, 0.1, True), (0.82, 2.0, True), (0.95, 0.3, True), (0.82, 0.1, True), (0.95, 0.6, False)]
-    for share, lasts_s, doubted in steps:
+    steps = [
+        (0.7, True, 0.1, True),
+        (0.82, True, 2.0, True),
+        (0.95, True, 0.3, True),
+        (0.82, True, 0.1, True),
+        (1.0, False, 2.0, True),  # the widths contradict each other, or there are none
+        (0.95, True, 0.6, False),
+    ]
+    for share, tells, lasts_s, doubted in steps:
+        seen = _Seen(share, 0.0, tells=tells)
         for _ in range(round(lasts_s / 0.02)):
-            warnings = monitor.step(0, 0.02, None, 1.5, None, _Seen(share, 0.0), FrameMonitor(), HEALTHY)
+            warnings = monitor.step(0, 0.02, None, 1.5, None, seen, FrameMonitor(), HEALTHY)
         assert warnings.height_doubted is doubted
 
 
 class _Seen(LineTracker):
     """What lines and motion say of the told height."""
 
-    def __init__(self, told_share: float, scale: float) -> None:
+    def __init__(self, told_share: float, scale: float, *, tells: bool = True) -> None:
         super().__init__(Lens(640, 360, 320.0, 320.0, 320.0, 180.0), Mount(), 0.075, 0.0)
-        self._told_share, self._scale = told_share, scale
+        self._told_share, self._scale, self._tells = told_share, scale, tells
 
     @property
     def height_share(self) -> float:
@@ -77,6 +85,10 @@ class _Seen(LineTracker):
     @property
     def height_off_m(self) -> float:
         return 1.5 - 1.5 / self._told_share
+
+    @property
+    def widths_tell(self) -> bool:
+        return self._tells
 
     @property
     def scale_share(self) -> float:

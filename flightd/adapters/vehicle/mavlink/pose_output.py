@@ -56,7 +56,9 @@ class PoseOutput:
         self._period_ns = round(1e9 / rate_hz)
         self._jump_m = jump_m
         self._last: SharedPose | None = None
-        self._last_ns: int | None = None
+        self._sent_ns: int | None = None
+        self._jumped = False
+        """What is sent next does not go on from what was sent before."""
         self._due_ns = 0
         self.resets = 0
         self.place_m = 0.0, 0.0
@@ -72,12 +74,11 @@ class PoseOutput:
 
     def make_standing(self, now_ns: int, attitude: Attitude, height_m: float) -> Message | None:
         """The message for a vehicle that stands on the floor, None while none is due: it does not move."""
-        if self._last is not None:
-            self._last = None
-            self._count_reset()
-        self._last_ns = attitude.stamp_ns
+        self._jumped |= self._last is not None
+        self._last, self._sent_ns = None, now_ns
+        age_ns = _STANDING_AGE_NS if self._firmware is Firmware.ARDUPILOT else 0
         pose = SharedPose(
-            stamp_ns=attitude.stamp_ns - _STANDING_AGE_NS,
+            stamp_ns=attitude.stamp_ns - age_ns,
             attitude=attitude,
             yaw_rad=attitude.yaw_rad,
             x_m=0.0,
@@ -101,31 +102,27 @@ class PoseOutput:
         if now_ns < self._due_ns:
             return None
         self._due_ns = max(self._due_ns + self._period_ns, now_ns + self._period_ns // 2)
+        gap = self._sent_ns is not None and now_ns - self._sent_ns > _GAP_NS
+        if gap or self._jumped:
+            self.resets = (self.resets + 1) % 256
+        self._sent_ns, self._jumped = now_ns, False
         if self._form is PoseForm.ODOMETRY:
             return odometry(pose, self.place_m, climb_mps, self.resets)
         return vision_position(pose, self.place_m, self.resets)
 
     def _follow(self, pose: SharedPose) -> None:
         """Go on by the way since the last pose.  A correction of the place on the map is no way that was
-        flown; what was flown in a gap is not known as well as if it had been seen."""
+        flown."""
         last, self._last = self._last, pose
-        gap = self._last_ns is not None and pose.stamp_ns - self._last_ns > _GAP_NS
-        self._last_ns = pose.stamp_ns
         if last is None:
-            if gap:
-                self._count_reset()
             return
         dt_s = (pose.stamp_ns - last.stamp_ns) * 1e-9
         flown = 0.5 * (pose.vx_mps + last.vx_mps) * dt_s, 0.5 * (pose.vy_mps + last.vy_mps) * dt_s
         way = pose.x_m - last.x_m, pose.y_m - last.y_m
         jumped = math.dist(way, flown) > self._jump_m or pose.corrections != last.corrections
-        if gap or jumped:
-            self._count_reset()
+        self._jumped |= jumped
         x_m, y_m = turned(*(flown if jumped else way), _turn(pose))
         self.place_m = self.place_m[0] + x_m, self.place_m[1] + y_m
-
-    def _count_reset(self) -> None:
-        self.resets = (self.resets + 1) % 256
 
 
 def turned(x: float, y: float, angle_rad: float) -> tuple[float, float]:

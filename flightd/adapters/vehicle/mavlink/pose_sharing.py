@@ -14,7 +14,9 @@ from flightd.core.types import LandedState, PoseUse, VehicleState
 
 _PAD_NEAR_M = 1.0
 """Further away the pad is not shown: a landing of last resort must not set out for it."""
-_STANDS_BELOW_M = 0.3
+_STANDS_BELOW_M, _MOST_ON_FLOOR_M = 0.3, 0.5
+"""What is read of an armed one that stands, and the most that any range finder reads on the floor."""
+_PAD_PERIOD_NS = 33_000_000
 
 
 class PoseSharing:
@@ -30,6 +32,16 @@ class PoseSharing:
     ) -> None:
         self._output = None if form is None else PoseOutput(form, firmware)
         self._firmware, self._rules, self._read = firmware, rules, read
+        self._flown = False
+        """Since it was armed it was in the air."""
+        self._pad_due_ns = 0
+
+    @property
+    def needed_names(self) -> tuple[tuple[str, ...], ...]:
+        """The parameters without which nothing is told, each by all its names."""
+        if self._output is None:
+            return ()
+        return tuple(rule.names for rule in self._rules if not rule.optional)
 
     @property
     def use(self) -> PoseUse:
@@ -47,31 +59,36 @@ class PoseSharing:
     ) -> Iterator[Message]:
         """What is due now: that it stands, or what a new frame showed, and the pad while it is near."""
         output = self._output
+        self._flown = state.armed and (self._flown or pose is not None or state.landed is LandedState.IN_AIR)
         if output is None or self.use is not PoseUse.GIVEN:
             return
-        if _stands(state):
+        if self._stands(state):
             message = output.make_standing(now_ns, state.attitude, state.height_m)
         elif pose is not None:
             message = output.make(now_ns, pose, state.climb_mps)
         else:
             message = None
-        if message is None:
+        if message is not None:
+            yield message
+        if pose is None or pad_m is None or now_ns < self._pad_due_ns:
             return
-        yield message
-        if pose is not None and pad_m is not None and math.dist(pad_m, (pose.x_m, pose.y_m)) < _PAD_NEAR_M:
+        if math.dist(pad_m, (pose.x_m, pose.y_m)) < _PAD_NEAR_M:
+            self._pad_due_ns = now_ns + _PAD_PERIOD_NS // 2
             yield landing_target(self._firmware, pose, pad_m, output.at_place(pose, pad_m))
+
+    def _stands(self, state: VehicleState) -> bool:
+        """It is not armed, or says that it stands, and its range finder does not contradict.  One that flew
+        and tells no height may say so in a descent of little thrust."""
+        if not state.armed:
+            return not state.height_m > _MOST_ON_FLOOR_M
+        unmeasured = math.isnan(state.height_m) and not self._flown
+        return state.landed is LandedState.ON_GROUND and (state.height_m <= _STANDS_BELOW_M or unmeasured)
 
 
 def pose_use(rules: tuple[Rule, ...], read: Read) -> PoseUse:
-    """What becomes of our motion by an autopilot's parameters, of those `rules` that are not optional."""
-    needed = [(rule, read(rule.names)) for rule in rules if not rule.optional]
-    if any(value is None for _, value in needed):
+    """What becomes of our motion by an autopilot's parameters: those `rules` that are optional have to fit
+    where it has them."""
+    if any(read(rule.names) is None for rule in rules if not rule.optional):
         return PoseUse.UNKNOWN
-    fits = all(judge(rule, value) is None for rule, value in needed)
+    fits = all(judge(rule, read(rule.names)) is None for rule in rules)
     return PoseUse.GIVEN if fits else PoseUse.NOT_TAKEN
-
-
-def _stands(state: VehicleState) -> bool:
-    """It says so, or is not armed, and its range finder does not contradict."""
-    on_floor = not state.armed or state.landed is LandedState.ON_GROUND
-    return on_floor and not state.height_m > _STANDS_BELOW_M

@@ -335,8 +335,8 @@ class MavlinkVehicle(abc.ABC):
 
     async def _read_parameters(self) -> None:
         """Those by which it is flown; the rest is read on the ground, by the examination."""
-        advised = tuple(rule.names for rule in self._advice if not rule.optional)
-        await self.parameters.keep((*self.parameter_names, *advised), self.required_names)
+        names = (*self.parameter_names, *self._pose.needed_names)
+        await self.parameters.keep(tuple(dict.fromkeys(names)), self.required_names)
 
     async def _examine(self) -> None:
         """Read all that the doctor would look at, again and again on the ground; what this version does not
@@ -357,7 +357,7 @@ class MavlinkVehicle(abc.ABC):
     def _tell_pose_use(self) -> None:
         """Tell people whenever the autopilot's estimator begins or ceases to take our motion."""
         before, self._told_use = self._told_use, self._pose.use
-        if self._told_use is before or self._told_use is PoseUse.NONE:
+        if self._told_use is before or self._told_use in {PoseUse.NONE, PoseUse.UNKNOWN}:
             return
         given = self._told_use is PoseUse.GIVEN
         text = "its estimator takes our motion" if given else "its estimator does not take our motion"
