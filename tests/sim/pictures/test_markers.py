@@ -78,7 +78,8 @@ def test_floors_without_a_marker_show_none_and_are_not_searched_unasked() -> Non
 def test_the_search_costs_a_small_part_of_a_detection() -> None:
     renderer = Renderer(replace(DEMO, markers=(TAG,)), CAMERA, DEFAULT, 3)
     picture = renderer.render(hover(1.5, 0.0, 1.2), 1)
-    detector = Detector(lens=LENS, markers=MarkerSet(TAG.dictionary, (TAG.id,)), now_ns=time.perf_counter_ns)
+    # by processor time: its threads wait for a core while other tests have it
+    detector = Detector(lens=LENS, markers=MarkerSet(TAG.dictionary, (TAG.id,)), now_ns=time.process_time_ns)
     timings = [detector.detect(picture).timings_ms for _ in range(15)]
     share = [told["markers"] / sum(told.values()) for told in timings]
     assert np.median(share) < 0.5
