@@ -121,7 +121,7 @@ def test_what_our_motion_needs_is_advised_where_it_is_left_to_the_autopilot_else
 @pytest.mark.parametrize("bits", range(16))
 def test_px4_is_told_our_motion_where_it_takes_the_speed_and_neither_height_nor_heading(bits: int) -> None:
     rules = pose_rules(Firmware.PX4, "auto", landing_target=False)
-    use = pose_use(rules, lambda names: (names[0], float(bits)))
+    use = pose_use(rules, lambda names: (names[0], float(bits) if names[0] == "EKF2_EV_CTRL" else 0.0))
     assert use is (PoseUse.GIVEN if bits in {4, 5} else PoseUse.NOT_TAKEN)
     assert pose_use(rules, lambda _: None) is PoseUse.UNKNOWN
 

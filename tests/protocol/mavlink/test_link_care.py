@@ -144,7 +144,7 @@ def test_either_side_may_start_first() -> None:
 # Poses
 
 
-_TAKES = {"VISO_TYPE": 1.0, "EK3_SRC1_POSXY": 6.0, "EK3_SRC1_VELXY": 6.0}
+_TAKES = {"VISO_TYPE": 1.0, "VISO_DELAY_MS": 80.0, "EK3_SRC1_POSXY": 6.0, "EK3_SRC1_VELXY": 6.0}
 
 
 def taking(**other: float) -> ScriptedAutopilot:

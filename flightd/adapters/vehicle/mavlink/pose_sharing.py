@@ -16,7 +16,7 @@ _PAD_NEAR_M = 1.0
 """Further away the pad is not shown: a landing of last resort must not set out for it."""
 _STANDS_BELOW_M, _MOST_ON_FLOOR_M = 0.3, 0.5
 """What is read of an armed one that stands, and the most that any range finder reads on the floor."""
-_PAD_PERIOD_NS = 33_000_000
+_PAD_PERIOD_NS = 33_333_333
 
 
 class PoseSharing:
@@ -73,7 +73,7 @@ class PoseSharing:
         if pose is None or pad_m is None or now_ns < self._pad_due_ns:
             return
         if math.dist(pad_m, (pose.x_m, pose.y_m)) < _PAD_NEAR_M:
-            self._pad_due_ns = now_ns + _PAD_PERIOD_NS // 2
+            self._pad_due_ns = max(self._pad_due_ns + _PAD_PERIOD_NS, now_ns + _PAD_PERIOD_NS // 2)
             yield landing_target(self._firmware, pose, pad_m, output.at_place(pose, pad_m))
 
     def _stands(self, state: VehicleState) -> bool:

@@ -335,7 +335,8 @@ class MavlinkVehicle(abc.ABC):
 
     async def _read_parameters(self) -> None:
         """Those by which it is flown; the rest is read on the ground, by the examination."""
-        names = (*self.parameter_names, *self._pose.needed_names)
+        advised = (rule.names for rule in self._advice if not rule.optional)
+        names = (*self.parameter_names, *advised, *self._pose.needed_names)
         await self.parameters.keep(tuple(dict.fromkeys(names)), self.required_names)
 
     async def _examine(self) -> None:
