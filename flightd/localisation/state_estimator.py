@@ -149,8 +149,9 @@ class StateEstimator:
             if not self._stuck.found:
                 self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
             self._count_climb(tick.now_ns, v.climb_mps)
-            if not self._stuck.found and not math.isnan(v.height_m):
-                self._carry_height(v.height_stamp_ns)
+            if not (self._stuck.found or self.climb.found or math.isnan(v.height_m)):
+                at_ns = v.height_stamp_ns
+                self._carried.measured(at_ns, self._heights.at(at_ns), self._climbed.at(at_ns))
             self._mind_height(tick.now_ns, v, commanded)
         self._waiting += (lines for lines in tick.lines if self.frames.take(lines) and self.armed)
         while self._waiting and self._is_due(self._waiting[0], tick.now_ns):
@@ -273,10 +274,6 @@ class StateEstimator:
             self.climb.step(exposed_ns, told_m, by_width_m, climbed_m)
             if self.climb.found:
                 carried.forget()
-
-    def _carry_height(self, stamp_ns: int) -> None:
-        if not self.climb.found:
-            self._carried.measured(stamp_ns, self._heights.at(stamp_ns), self._climbed.at(stamp_ns))
 
     def _count_climb(self, now_ns: int, climb_mps: float) -> None:
         """What the vehicle tells to have climbed; over a gap nothing is compared."""

@@ -70,8 +70,6 @@ _OUTLIER_SIGMAS = 3.0
 _FEATURES, _FRESH, _TELLING, _FEATURE_SIGMAS, _FEATURE_NS = 6, 3, 2, 4.0, 500_000_000
 """So many features are held across an axis, those seen last, since several detectors take turns; so many are
 followed from one frame, so many tell the motion; none that errs by more, or is not seen for so long."""
-_GLIMPSE_NS = 250_000_000
-"""A line seen less often than `SURE_HITS` is forgotten so soon: what only shows now and then is none."""
 _CARRIED_M = 0.12
 """A line whose place features of the floor have told this well is held on, however long it is not seen."""
 _SURVEY_SIGMAS = 4.0
@@ -499,11 +497,12 @@ class FloorFilter:
                 continue
             lines.append(line)
             unseen_ns = stamp_ns - held.seen_ns
-            if unseen_ns > _GLIMPSE_NS:
+            lost = held.is_lost(stamp_ns)
+            if lost:
                 held.from_m = held.to_m = 0.0  # where it was in view is no longer known
             carried = stamp_ns - self._followed_ns[held.axis] <= _FEATURE_NS
             held_on = carried and self.offset(line)[1] < _CARRIED_M
-            glimpsed = held.hits < SURE_HITS and unseen_ns > _GLIMPSE_NS
+            glimpsed = lost and held.hits < SURE_HITS
             if glimpsed or (unseen_ns > self._forget_ns and not held_on):
                 old.add(line)
         lines.sort(key=lambda line: -self.held[line].seen_ns)

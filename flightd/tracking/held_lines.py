@@ -13,8 +13,9 @@ _LEAST_SHARE = 0.3
 SURE_HITS = 3
 """A line seen so often is surely one."""
 _LOST_NS, _NEW_HITS = 250_000_000, 10
-"""What is found where a line should be that was not seen for longer is taken for that once it is surely a
-line: a stain that shows for a frame would else tell where the drone is, and how fast."""
+"""A line seen less often is forgotten so soon: what only shows now and then is none.  What is found where a
+line should be that was not seen for longer is taken for that once it is surely a line, and while it is new:
+a stain that shows for a frame would else tell where the drone is, and how fast."""
 
 
 @dataclass(slots=True)

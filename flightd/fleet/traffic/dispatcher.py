@@ -29,6 +29,7 @@ _SPARE_FRAC: Final = 0.25
 _SPARE_MS: Final = 45_000
 _SLOWER: Final = 1.15
 """What a flight takes beside what was planned, at most on average."""
+_WITH_SPARE: Final = _SLOWER * (1 + _SPARE_FRAC)
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,7 +308,7 @@ class Dispatcher:
     def _left_ms(self, drone: str) -> int:
         """In the air, down to the reserve and the way to a dock."""
         keep_ms = self.docks.keep_ms(drone)
-        spare_ms = int(_SLOWER * (1 + _SPARE_FRAC) * keep_ms) + _SPARE_MS if keep_ms else 0
+        spare_ms = int(_WITH_SPARE * keep_ms) + _SPARE_MS if keep_ms else 0
         return self._endurance.left_ms(self._charge.get(drone, 1.0)) - spare_ms
 
     def _fill_batteries(self, now_ms: int) -> None:
@@ -325,7 +326,7 @@ class Dispatcher:
             ):
                 known[drone] = Standing(self._charge[drone], self._charging[drone])
                 spared_ms = self._endurance.left_ms(self._charge[drone]) - _SPARE_MS
-                left_ms[drone] = int(spared_ms / (_SLOWER * (1 + _SPARE_FRAC)))
+                left_ms[drone] = int(spared_ms / _WITH_SPARE)
         self.docks.step(now_ms, known, left_ms)
 
     def _replanned(self, drones: Sequence[str], now_ms: int) -> None:
@@ -363,7 +364,7 @@ class Dispatcher:
     def _give_tour(self, drone: str, now_ms: int, most: int) -> bool:
         course, home = self.control.drones[drone], self.docks.home(drone)
         left_ms = self._left_ms(drone)
-        budget_ms = int(left_ms / (_SLOWER * (1 + _SPARE_FRAC)))
+        budget_ms = int(left_ms / _WITH_SPARE)
         busy = {self.queue.work(node).aisle for node in self.queue.given}
         nodes = self.queue.tour(self._times(course.place, home), budget_ms, busy, most, drone)
         ends = (home,)
