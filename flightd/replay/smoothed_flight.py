@@ -26,6 +26,9 @@ Array: TypeAlias = NDArray[np.float64]
 _STEPS = 20_000
 """Longer flights are thinned to so many poses: 50 Hz for seven minutes, 5 Hz for an hour."""
 
+_MOST = 1e6
+"""m, m/s, m²: a log may hold any number, no hall does."""
+
 _DRIFT_MPRTS = 0.03
 """What the position gains in doubt between two sightings, metres per square root of a second: the value at
 which eight simulated flights came nearest to their truth, 2 to 24 % nearer than live."""
@@ -56,7 +59,7 @@ class SmoothedFlight:
 def smooth(poses: Sequence[GridPose]) -> SmoothedFlight:
     """Smooth a flight's poses, which are in the order of their stamps.
 
-    Poses that are not numbers, or come no later than the one before, are left out.
+    Poses that no hall has, that have no variance, or that come no later than the one before, are left out.
     """
     chosen = _usable(poses)
     stamps_ns = np.array([p.stamp_ns for p in chosen], np.int64)
@@ -107,7 +110,8 @@ def _usable(poses: Sequence[GridPose]) -> list[GridPose]:
     chosen: list[GridPose] = []
     for pose in poses[:: max(1, math.ceil(len(poses) / _STEPS))]:
         numbers = (pose.x_m, pose.y_m, pose.vx_mps, pose.vy_mps, pose.covariance[0], pose.covariance[4])
-        if all(map(math.isfinite, numbers)) and (not chosen or pose.stamp_ns > chosen[-1].stamp_ns):
+        sensible = all(abs(number) < _MOST for number in numbers) and min(numbers[-2:]) >= 0.0
+        if sensible and (not chosen or pose.stamp_ns > chosen[-1].stamp_ns):
             chosen.append(pose)
     return chosen
 

@@ -102,6 +102,9 @@ def test_poses_that_are_no_numbers_or_repeat_are_left_out() -> None:
     smoothed = smooth([pose(1, 0.0), pose(2, 0.01), pose(2, 0.02), odd, pose(4, 0.03)])
     assert smoothed.stamp_ns.tolist() == [TICK_NS, 2 * TICK_NS, 4 * TICK_NS]
     assert np.isfinite(smoothed.x_m).all()
+    for wild in ({"x_m": 1e308}, {"covariance": (-1.0, *pose(3, 0.0).covariance[1:])}):
+        odd = dataclasses.replace(pose(3, 0.0), **wild)
+        assert len(smooth([pose(1, 0.0), odd, pose(4, 0.03)]).x_m) == 2, wild
     assert len(smooth([]).x_m) == 0
     assert smooth([pose(1, 0.5)]).x_m.tolist() == [0.5]
 

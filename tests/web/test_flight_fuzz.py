@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import random
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import pytest
 from mcap.writer import Writer
@@ -16,13 +17,17 @@ from flightd.ground.flights.flight_row import read_rows
 from flightd.ground.flights.flight_view import read_view
 from flightd.ground.flights.log_folder import find_logs
 from flightd.replay.log_chunks import LogChunks
+from flightd.replay.report.loader import load_flight
 from tests.replay.synthetic_flight import write_flight
+
+Spoil: TypeAlias = Callable[[Any, random.Random], Any]
 
 WILD: tuple[Any, ...] = (
     None, True, -1, 0, 2**63, 2**64 - 1, -(2**70), 1e308, -1e308, 1e-320, "", "x" * 50, "\ud800x", [], {},
     [None] * 9,
 )  # fmt: skip
 RARELY = 0.0004
+WILD_NUMBERS = (1e308, -1e308, 1.5e154, 3e200, -2e170, 1e-320, 0.0, 1e9)
 WILD_STAMPS = (0, 2**63, 2**64 - 1)
 TAKEN = frozenset(Topic) - {Topic.LINES}
 
@@ -42,14 +47,27 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, int, A
 def spoilt(value: Any, chance: random.Random) -> Any:
     if chance.random() < RARELY:
         return chance.choice(WILD)
+    return inside(value, spoilt, chance)
+
+
+def with_wild_numbers(value: Any, chance: random.Random) -> Any:
+    """Of the right kind, so that nothing refuses it."""
+    if isinstance(value, float) and chance.random() < 0.01:
+        return chance.choice(WILD_NUMBERS)
+    return inside(value, with_wild_numbers, chance)
+
+
+def inside(value: Any, spoil: Spoil, chance: random.Random) -> Any:
     if isinstance(value, dict):
-        return {key: spoilt(item, chance) for key, item in value.items()}
+        return {key: spoil(item, chance) for key, item in value.items()}
     if isinstance(value, list):
-        return [spoilt(item, chance) for item in value]
+        return [spoil(item, chance) for item in value]
     return value
 
 
-def write_spoilt(path: Path, messages: list[tuple[str, int, Any]], chance: random.Random) -> None:
+def write_spoilt(
+    path: Path, messages: list[tuple[str, int, Any]], chance: random.Random, spoil: Spoil = spoilt
+) -> None:
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start("", "")
@@ -58,7 +76,7 @@ def write_spoilt(path: Path, messages: list[tuple[str, int, Any]], chance: rando
             if topic not in channels:
                 channels[topic] = writer.register_channel(topic, "json", 0)
             stamp = chance.choice(WILD_STAMPS) if chance.random() < 0.02 else stamp_ns
-            writer.add_message(channels[topic], stamp, json.dumps(spoilt(value, chance)).encode(), stamp)
+            writer.add_message(channels[topic], stamp, json.dumps(spoil(value, chance)).encode(), stamp)
         writer.finish()
 
 
@@ -80,3 +98,12 @@ def test_a_log_of_wild_messages_is_listed_and_played_or_refused(
         curves = json.loads(view.series(0.0, 1e12, 50))["curves"]
         assert {len(curve) for curve in curves.values()} <= {100}, seed
     assert min(played, refused) > 5
+
+
+def test_numbers_that_no_flight_has_are_told_as_unknown_by_page_and_report(
+    messages: list[tuple[str, int, Any]], tmp_path: Path
+) -> None:
+    for seed in range(24):
+        write_spoilt(tmp_path / "flight.mcap", messages, random.Random(seed), with_wild_numbers)
+        assert json.loads(read_view(tmp_path, "flight.mcap").head)["duration_s"] > 0, seed
+        assert load_flight(tmp_path / "flight.mcap").duration_s > 0, seed

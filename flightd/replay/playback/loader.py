@@ -118,7 +118,9 @@ def load_playback(path: Path) -> Playback:
         table.column_set(start_ns) for table in (gathered.vehicle, gathered.setpoints, gathered.statuses)
     )
     legs = legs_of(site, moments, gathered.chosen or gathered.nodes)
-    found = quantities(site, moments, legs, poses, truth, vehicle, setpoints, statuses)
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is told as unknown
+        found = quantities(site, moments, legs, poses, truth, vehicle, setpoints, statuses)
+        estimated = _estimated(site, moments, poses, found)
     stretches = min(max(math.ceil(duration_s / _FINEST_S), 1), _MOST_STRETCHES)
     grid = TimeGrid(0.0, duration_s, stretches)
     return Playback(
@@ -143,7 +145,7 @@ def load_playback(path: Path) -> Playback:
             name: np.clip(decimated(t_s, values, grid), -_MOST_VALUE, _MOST_VALUE).astype(np.float32)
             for name, (t_s, values) in found.items()
         },
-        estimated=_estimated(site, moments, poses, found),
+        estimated=estimated,
     )
 
 
