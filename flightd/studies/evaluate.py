@@ -133,6 +133,7 @@ def summary(score: LineScore) -> dict[str, float | int | None]:
     """The numbers of one method; None where nothing was matched."""
     rho, theta = score.rho_px(), np.degrees(score.theta_rad())
     sigma_rho, sigma_theta = score.sigma_ratios()
+    within_rho, within_theta = score.within_sigma_parts()
     return {
         "rho_mean_px": _number(rho.mean() if rho.size else math.nan),
         "rho_median_px": _number(_quantile(rho, 0.5)),
@@ -156,6 +157,8 @@ def summary(score: LineScore) -> dict[str, float | int | None]:
         "nodes_false": score.nodes_false,
         "sigma_rho_ratio": _number(sigma_rho),
         "sigma_theta_ratio": _number(sigma_theta),
+        "within_sigma_rho_part": _number(within_rho),
+        "within_sigma_theta_part": _number(within_theta),
         "ms_median": _number(_quantile(np.array(score.ms), 0.5)),
     }
 
@@ -194,7 +197,7 @@ def as_json(
 
 _COLUMNS = (
     "rho px\nmean", "\nmedian", "\np95", "theta °\nmean", "\nmedian", "\np95", "missed\n%", "false\n%",
-    "found\n2 %, 3°", "clean\nnegatives", "nodes\nfound", "error/sigma\nrho theta", "ms",
+    "found\n2 %, 3°", "clean\nnegatives", "nodes\nfound", "in 1 sigma\nrho theta", "ms",
     "paper: rho\nsim real", "theta\nsim real",
 )  # fmt: skip
 
@@ -218,7 +221,7 @@ def print_table(dataset: Path, scores: dict[str, LineScore], count: int, console
             f"{100 * score.found_part:.1f} %",
             f"{score.negatives_clean}/{score.negatives}",
             f"{score.nodes_named}/{score.nodes_labelled}",
-            f"{_cell(s['sigma_rho_ratio'])} {_cell(s['sigma_theta_ratio'])}",
+            " ".join(_cell(s[f"within_sigma_{name}_part"]) for name in ("rho", "theta")),
             _cell(s["ms_median"]),
             f"{simulated[0]:.0f} {real[0]:.0f}",
             f"{simulated[1]:.0f} {real[1]:.0f}",

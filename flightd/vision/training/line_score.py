@@ -48,7 +48,8 @@ class Gate:
 
 @dataclass(frozen=True, slots=True)
 class LineError:
-    """One matched pair: absolute errors, and the errors in units of the sigmas the detector claimed."""
+    """One matched pair: absolute errors, and the errors in units of what the detector's sigma and the doubt
+    of the label itself (`uncert_px`, `uncert_deg`) come to."""
 
     rho_px: float
     theta_rad: float
@@ -97,12 +98,20 @@ class LineScore:
         return np.array([error.theta_rad for error in self.errors])
 
     def sigma_ratios(self) -> tuple[float, float]:
-        """Spread of the errors in units of the claimed sigmas (rho, theta), robust; 1 is calibrated."""
+        """Spread of the errors in units of the sigmas (rho, theta), robust: 1 is calibrated."""
         if not self.errors:
             return math.nan, math.nan
         rho = float(np.median([error.rho_sigmas for error in self.errors]))
         theta = float(np.median([error.theta_sigmas for error in self.errors]))
         return rho / _HALF_NORMAL_MEDIAN, theta / _HALF_NORMAL_MEDIAN
+
+    def within_sigma_parts(self) -> tuple[float, float]:
+        """Part of the errors within one sigma (rho, theta); 0.683 where errors are normal and sigmas true."""
+        if not self.errors:
+            return math.nan, math.nan
+        rho = sum(error.rho_sigmas <= 1.0 for error in self.errors)
+        theta = sum(error.theta_sigmas <= 1.0 for error in self.errors)
+        return rho / len(self.errors), theta / len(self.errors)
 
 
 _HALF_NORMAL_MEDIAN = 0.6745
@@ -217,8 +226,8 @@ def _error(label: LabelledLine, line: Line, width: int, height: int) -> LineErro
     return LineError(
         rho_error,
         theta_error,
-        rho_error / max(line.sigma_rho_px, 1e-9),
-        theta_error / max(line.sigma_theta_rad, 1e-9),
+        rho_error / max(math.hypot(line.sigma_rho_px, label.uncert_px), 1e-9),
+        theta_error / max(math.hypot(line.sigma_theta_rad, math.radians(label.uncert_deg)), 1e-9),
         rho_error <= FOUND_ACROSS * width and theta_error <= FOUND_ANGLE_RAD,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -61,6 +62,19 @@ def test_errors_are_those_of_rho_and_theta_also_where_theta_wraps(
     assert error.rho_px == pytest.approx(abs(off), abs=1e-6)
     assert error.theta_rad == pytest.approx(abs(turn), abs=1e-9)
     assert error.rho_sigmas == pytest.approx(abs(off) / 0.1, abs=1e-4)
+
+
+def test_the_doubt_of_the_label_is_part_of_the_error() -> None:
+    doubted = msgspec.structs.replace(label(0, 0.5), uncert_px=2.0, uncert_deg=0.5)
+    (error,) = scored(shown(doubted), seen(line(2, 0.5 + math.radians(0.25)))).errors
+    assert error.rho_sigmas == pytest.approx(1.0, rel=0.01)
+    assert error.theta_sigmas == pytest.approx(0.5, rel=0.01)
+
+
+def test_the_part_within_a_sigma_is_counted() -> None:
+    score = scored(shown(label(0, 0.5), label(60, 0.5)), seen(line(0.05, 0.5), line(60.5, 0.5)))
+    assert score.within_sigma_parts() == (0.5, 1.0)
+    assert all(map(math.isnan, LineScore().within_sigma_parts()))
 
 
 def test_a_line_beyond_the_gate_is_missed_and_its_detection_false() -> None:
