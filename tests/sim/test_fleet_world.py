@@ -124,3 +124,23 @@ def test_who_lands_without_contact_says_so_lands_anew_and_takes_another_dock_in_
         f"has no contact on dock {other}: it lands anew",
     ]
     assert fly_fleet(replace(docked, misaligned=0.3)).good
+
+
+def test_a_full_battery_that_takes_no_more_is_no_missing_contact() -> None:
+    docked = replace(SMALL, aisles=10, nodes=10, failing=0, closes_aisle=False, contacts=4)
+    simulation = FleetSimulation(docked)
+    step, full = simulation.world.step, 0
+
+    def watched(dt_s: float) -> None:
+        nonlocal full
+        step(dt_s)
+        places = {dock.place for dock in simulation.docks}
+        full += sum(
+            drone.place in places and drone.charge == 1.0 and not drone.charging
+            for drone in simulation.world.drones.values()
+        )
+
+    simulation.world.step = watched  # type: ignore[method-assign]
+    document = simulation.run().document()
+    assert full > 50
+    assert document["docks_told"] == []

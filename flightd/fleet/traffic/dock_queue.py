@@ -104,11 +104,14 @@ class DockQueue:
         course, dock = self._control.drones[drone], self._dock_of(drone)
         if dock is None or course.ahead or course.place != dock.place:
             return
-        if standing.charging:
+        # a full battery takes no more
+        is_well = standing.charging or standing.charge >= self._full_enough
+        if is_well:
             self._landings.pop(drone, None)
             self._shunned.pop(drone, None)
         if (
-            standing.charging is not False
+            is_well
+            or standing.charging is None
             or now_ms - course.since_ms < _CONTACT_MS
             or self._is_early(drone, now_ms)
         ):

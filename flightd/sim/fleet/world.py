@@ -147,7 +147,7 @@ class FleetWorld:
             fill = self._fill if drone.charging else 0.0
             drone.charge = min(drone.charge + fill * dt_s, 1.0)
         elif dock.kind is DockKind.CONTACT:
-            drone.charging = drone.contact
+            drone.charging = drone.contact and drone.charge < 1.0
             drone.charge = min(drone.charge + (dt_s / dock.full_s if drone.contact else 0.0), 1.0)
         else:
             drone.charging = True
