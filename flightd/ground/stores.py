@@ -21,7 +21,8 @@ from flightd.inventory.place_view import PlaceView, place_views
 from flightd.replay.log import LogReader
 from flightd.site.site import Site
 from flightd.site.site_file import parse_site
-from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, MOST_PIXELS, jpeg_size
+from flightd.vision.jpeg import MOST_PIXELS, jpeg_size
+from flightd.vision.shelf.evidence_jpeg import MOST_BYTES
 
 _FILE, _LOG, _TRUTH = "inventory.db", "*.mcap", "truth.mcap"
 _DEPTH = 4

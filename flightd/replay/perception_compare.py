@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-import cv2
 import numpy as np
 
 from flightd.core.geometry import wrap_half_pi
 from flightd.core.topics import RecordedFrame, Topic
 from flightd.core.types import Image, Line, LineSet
 from flightd.replay.log import LogReader, read_log
+from flightd.vision.jpeg import decoded_jpeg
 
 Detect: TypeAlias = Callable[[Image, int, int], LineSet]
 """Picture, frame number and stamp to lines."""
@@ -81,12 +81,10 @@ def replay_pictures(path: Path, detect: Detect, every: int = 1) -> PerceptionDri
         seen += 1
         if seen % every:
             continue
-        image = (
-            cv2.imdecode(np.frombuffer(picture.jpeg, np.uint8), cv2.IMREAD_COLOR) if picture.jpeg else None
-        )
+        image = decoded_jpeg(picture.jpeg)
         if image is None or (image.shape[1], image.shape[0]) != (before.width_px, before.height_px):
             continue
-        after = detect(image.astype(np.uint8, copy=False), picture.seq, picture.stamp_ns)
+        after = detect(image, picture.seq, picture.stamp_ns)
         pairs = _pairs(before.lines, after.lines)
         pictures += 1
         gone += len(before.lines) - len(pairs)

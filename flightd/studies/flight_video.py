@@ -15,6 +15,7 @@ from flightd.core.types import Image, LineSet, Status
 from flightd.replay.log import LogReader, read_log
 from flightd.studies.overlay import draw
 from flightd.studies.progress_bar import track
+from flightd.vision.jpeg import decoded_jpeg
 
 _FASTEST_FPS = 60.0
 _LONGEST_STILL = 300
@@ -92,10 +93,9 @@ def _opened(video: Path, fps: float, canvas: Image) -> cv2.VideoWriter:
 
 def _decoded(picture: RecordedFrame, seen: LineSet | None) -> Image | None:
     """The picture, in the size in which its lines were measured; None if it is none."""
-    decoded = cv2.imdecode(np.frombuffer(picture.jpeg, np.uint8), cv2.IMREAD_COLOR) if picture.jpeg else None
-    if decoded is None:
+    image = decoded_jpeg(picture.jpeg)
+    if image is None:
         return None
-    image: Image = decoded.astype(np.uint8, copy=False)
     if seen is not None and (image.shape[1], image.shape[0]) != (seen.width_px, seen.height_px):
         image = cv2.resize(image, (seen.width_px, seen.height_px)).astype(np.uint8, copy=False)
     return image

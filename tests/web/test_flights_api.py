@@ -22,7 +22,7 @@ from flightd.ground.flights.flight_index import FlightIndex
 from flightd.ground.flights.flight_view import read_view
 from flightd.ground.flights.flights import Flights
 from flightd.ground.reading_process import MOST_WAITING, ReadingProcess
-from flightd.vision.shelf.evidence_jpeg import jpeg_size
+from flightd.vision.jpeg import jpeg_size
 from tests.replay.synthetic_flight import write_flight
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.waiting import until

@@ -9,7 +9,6 @@ import shutil
 import sqlite3
 from pathlib import Path
 
-import numpy as np
 import pytest
 from PIL import Image
 from starlette.requests import Request
@@ -20,7 +19,8 @@ from flightd.ground.evidence_outlines import outlines
 from flightd.ground.stock_routes import answered
 from flightd.ground.stores import Stores
 from flightd.site.site_file import load_site
-from flightd.vision.shelf.evidence_jpeg import evidence_jpeg, jpeg_size, picture_name
+from flightd.vision.jpeg import jpeg_size
+from flightd.vision.shelf.evidence_jpeg import picture_name
 from tests.rigs.event_loops import in_real_time
 from tests.web.served import served
 from tests.web.stock_rig import RACKS, counted_store, flown_log, picture_of
@@ -171,13 +171,6 @@ def test_a_picture_of_absurd_size_is_refused_before_it_is_decoded(folder: Path) 
     out = io.BytesIO()
     Image.new("1", (8000, 8000)).save(out, "PNG")
     assert outlines(out.getvalue()) == (), "no JPEG"
-
-
-def test_the_size_of_a_picture_is_read_from_its_header() -> None:
-    jpeg = evidence_jpeg(np.zeros((123, 456, 3), np.uint8))
-    assert jpeg_size(jpeg) == (456, 123)
-    for length in range(len(jpeg)):
-        assert jpeg_size(jpeg[:length]) in {None, (456, 123)}
     assert [text for text, _ in outlines(picture_of("ABC"))] == ["ABC"]
 
 

@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import cv2
-import numpy as np
 
 from flightd.app.build import detector_of, pilot_of
 from flightd.app.log_study.finding import Finding, LogFindings, Outcome, Study, same_or
@@ -28,6 +27,7 @@ from flightd.replay.report.stock import CountedStock
 from flightd.replay.tolerances import LAST_DIGITS, MOST_PIXELS
 from flightd.studies.counted_stock import counted_beside
 from flightd.studies.flight_calibration import calibrate_by_flight
+from flightd.vision.jpeg import decoded_jpeg
 from flightd.vision.shelf.code_reader import read_codes
 
 _LOST_SHARE: Final = 0.02
@@ -113,8 +113,7 @@ def _kept(counted: CountedStock, record: LocationRecord) -> Image | None:
     """The picture that vouches for a place, None where none is kept or it cannot be read."""
     name = record.observation.evidence if record.observation else ""
     jpeg = counted.picture(name) if name else None
-    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if jpeg else None
-    return None if picture is None else np.asarray(picture, np.uint8)
+    return decoded_jpeg(jpeg) if jpeg else None
 
 
 def _judge(path: Path) -> Finding:

@@ -76,13 +76,9 @@ def read_thumbnail(root: Path, relative: str) -> bytes:
     """In the reading process: a small JPEG of the middle of the flight, empty where there is no picture."""
     import cv2  # noqa: PLC0415 - slow, and only that process needs it
 
-    from flightd.vision.shelf.evidence_jpeg import MOST_PIXELS, jpeg_size  # noqa: PLC0415
+    from flightd.vision.jpeg import decoded_jpeg  # noqa: PLC0415
 
-    jpeg = middle_picture(path_of(root, relative))
-    size = jpeg_size(jpeg)
-    if size is None or size[0] * size[1] > MOST_PIXELS:
-        return b""
-    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    picture = decoded_jpeg(middle_picture(path_of(root, relative)))
     if picture is None:
         return b""
     height = max(1, min(_THUMBNAIL_PX, round(_THUMBNAIL_PX * picture.shape[0] / picture.shape[1])))

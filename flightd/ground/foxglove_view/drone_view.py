@@ -21,7 +21,7 @@ from flightd.adapters.ground_link.messages.floor import CameraOptics
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.preview import CameraName
 from flightd.ground.messages import LinkPicture
-from flightd.vision.shelf.evidence_jpeg import jpeg_size
+from flightd.vision.jpeg import jpeg_size
 
 _APART_NS = 2_000_000_000
 """A status that seems older than this is none that was long on its way: the clocks run apart, or one was

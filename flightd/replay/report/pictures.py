@@ -13,6 +13,7 @@ from flightd.core.types import LineKind, LineSet
 from flightd.replay.log import LogReader
 from flightd.replay.report.flight import FLYING, RecordedFlight
 from flightd.replay.report.markup import clock, element, number, text
+from flightd.vision.jpeg import decoded_jpeg
 
 _SHOWN = 6
 _WIDEST_PX = 960
@@ -78,14 +79,14 @@ def _counted(count: int, noun: str) -> str:
 
 def _embedded(jpeg: bytes) -> tuple[str, int, int] | None:
     """The picture as a data URI with its size, made smaller if it is large; None if it is no picture."""
-    image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if jpeg else None
+    image = decoded_jpeg(jpeg)
     if image is None:
         return None
     height_px, width_px = image.shape[:2]
     if width_px > _WIDEST_PX:
         height_px, width_px = round(height_px * _WIDEST_PX / width_px), _WIDEST_PX
-        image = cv2.resize(image, (width_px, height_px), interpolation=cv2.INTER_AREA)
-        jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+        smaller = cv2.resize(image, (width_px, height_px), interpolation=cv2.INTER_AREA)
+        jpeg = cv2.imencode(".jpg", smaller, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
     return f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}", width_px, height_px
 
 

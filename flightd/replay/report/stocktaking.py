@@ -19,6 +19,7 @@ from flightd.replay.report.markup import NOTHING, element, table, text
 from flightd.replay.report.racks import STATE_NAMES, racks_section
 from flightd.replay.report.stock import SETTLED, CountedStock, share
 from flightd.site.site import Site
+from flightd.vision.jpeg import decoded_jpeg
 
 _PICTURES_BYTES = 12_000_000
 """All pictures in the page together, before base64; those of exceptions come first."""
@@ -224,7 +225,7 @@ def _pictures(count: CountedStock, outcomes: Mapping[str, str]) -> dict[str, str
 
 def _small(jpeg: bytes) -> bytes | None:
     """The picture at most 480 px wide; None for a file that is no picture."""
-    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    picture = decoded_jpeg(jpeg)
     if picture is None:
         return None
     height_px, width_px = picture.shape[:2]

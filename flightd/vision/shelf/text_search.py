@@ -6,12 +6,9 @@ import hashlib
 import json
 from collections.abc import Sequence
 
-import cv2
-import numpy as np
-
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.label_values import LabelValue
-from flightd.vision.shelf.evidence_jpeg import MOST_PIXELS, jpeg_size
+from flightd.vision.jpeg import decoded_jpeg
 from flightd.vision.shelf.text_reader import TextReader
 from flightd.vision.shelf.text_values import text_values
 
@@ -39,10 +36,7 @@ class TextSearch:
 
     def __call__(self, jpeg: bytes) -> tuple[LabelValue, ...]:
         """BrokenPictureError for what is no picture."""
-        size = jpeg_size(jpeg)
-        if size is None or size[0] * size[1] > MOST_PIXELS:
-            raise BrokenPictureError("no picture that can be read")
-        bgr = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+        bgr = decoded_jpeg(jpeg)
         if bgr is None:
-            raise BrokenPictureError("a damaged picture")
-        return text_values(self._reader.read(np.asarray(bgr, np.uint8)), self._patterns)
+            raise BrokenPictureError("no picture that can be read")
+        return text_values(self._reader.read(bgr), self._patterns)
