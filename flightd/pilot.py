@@ -17,10 +17,10 @@ from flightd.core.tick import TICK_S, StepFailure, TickInput, TickOutput
 from flightd.core.types import AttitudeSetpoint, Command, CommandKind, Demand, Phase
 from flightd.localisation.state_estimator import Estimate, StateEstimator
 from flightd.mission.flight.steering import Steering
-from flightd.mission.guidance import MissionInputs
+from flightd.mission.guidance import Guidance, MissionInputs
 from flightd.mission.mission import Mission
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
-from flightd.mission.safety.last_resort import LastResort
+from flightd.mission.safety.last_resort import LastResort, sinking_by_sight
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.site.site import Site
@@ -129,14 +129,24 @@ class Pilot:
                 resort.caught(tick.now_ns, err)
             else:
                 return self._answered
-        self._answered = resort.answer(tick, self._answered, self._mission.drain_events, self._scanner.drain)
+        self._answered = resort.answer(
+            tick,
+            self._answered,
+            self._mission.drain_events,
+            self._scanner.drain,
+            lambda: self._sink_by_sight(tick),
+        )
         self._commanded = self._answered.setpoint
         return self._answered
 
-    def _fly(self, tick: TickInput) -> TickOutput:
-        now_ns = tick.now_ns
+    def _since_last_s(self, now_ns: int) -> float:
         dt_s = TICK_S if self._last_ns is None else max((now_ns - self._last_ns) * 1e-9, 1e-3)
         self._last_ns = now_ns
+        return dt_s
+
+    def _fly(self, tick: TickInput) -> TickOutput:
+        now_ns = tick.now_ns
+        dt_s = self._since_last_s(now_ns)
         self._take(tick.commands, now_ns)
         # a vehicle that tells nothing has not disarmed: where the drone is would be forgotten
         armed = self._estimator.armed if tick.vehicle is None else tick.vehicle.armed
@@ -149,11 +159,7 @@ class Pilot:
         self._scan(tick)
         inputs = self._inputs(tick, dt_s, known)
         guidance = self._mission.step(inputs)
-        push_mps2 = (tracks.push_x_mps2, tracks.push_y_mps2) if tracks is not None else (0.0, 0.0)
-        stand_yaw_rad = self._mission.stand[1]
-        setpoint = self._commanded = self._steering.step(
-            inputs, guidance, push_mps2, stand_yaw_rad, known.lead, known.conditions
-        )
+        setpoint = self._commanded = self._steer(inputs, guidance, known)
         self._plausibility.steered(now_ns, guidance, pose)
         mission = self._mission
         findings, settled = self._scanner.drain()
@@ -172,6 +178,21 @@ class Pilot:
             settled=settled,
             shared=known.shared,
         )
+
+    def _steer(self, inputs: MissionInputs, guidance: Guidance, known: Estimate) -> AttitudeSetpoint | None:
+        tracks = known.tracks
+        push_mps2 = (tracks.push_x_mps2, tracks.push_y_mps2) if tracks is not None else (0.0, 0.0)
+        stand_yaw_rad = self._mission.stand[1]
+        return self._steering.step(inputs, guidance, push_mps2, stand_yaw_rad, known.lead, known.conditions)
+
+    def _sink_by_sight(self, tick: TickInput) -> AttitudeSetpoint | None:
+        """Without the mission: what has failed may be that alone."""
+        dt_s = self._since_last_s(tick.now_ns)
+        self._estimator.take(tick, self._commanded)
+        known = self._estimator.step(tick.now_ns)
+        inputs = self._inputs(tick, dt_s, known)
+        guidance = sinking_by_sight(inputs, self._config.mission.land_mps)
+        return None if guidance is None else self._steer(inputs, guidance, known)
 
     def _take(self, commands: Sequence[Command], now_ns: int) -> None:
         """Give the mission all orders, also those behind one that fails; its error is raised then."""

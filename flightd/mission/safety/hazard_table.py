@@ -398,8 +398,10 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.STEP_FAILED,
         "an error in the flight software itself, at whatever place of a control tick",
         Action.LAND,
-        "level at the same tick; the next one lands, by the lines; where that fails too, level and down by"
-        " the autopilot's own landing; the error is an event, its traceback is in the flight log",
+        "level at the same tick; the next one lands, by the lines; where that fails too, it comes to rest"
+        " over the floor and sinks by what is seen of it, without the mission, and below 0.4 m or where that"
+        " fails as well, level and down by the autopilot's own landing; the error is an event, its traceback"
+        " is in the flight log",
         "tests/sim/hazards/test_step_failures.py",
     ),
     Hazard(

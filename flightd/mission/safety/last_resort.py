@@ -1,12 +1,15 @@
-"""What is flown when the step itself fails: level and down, by what the vehicle reports alone.  Pure."""
+"""What is flown when the step itself fails: down by what is still seen of the floor, or else level and down
+by what the vehicle reports alone.  Pure."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from flightd.config.mission import MissionConfig
+from flightd.control.flight_controller import Reference
 from flightd.core.scanning import Finding, Settled
 from flightd.core.tick import StepFailure, TickInput, TickOutput
 from flightd.core.types import (
@@ -19,6 +22,7 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
+from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.safety.hazard_table import ACTIONS
 from flightd.mission.triggers import Trigger
 
@@ -28,6 +32,11 @@ _HEARTBEAT_NS = 2_000_000_000
 """Heartbeats come each second: without a newer one, modes and arming are those of the past."""
 _GIVE_UP_NS = 60_000_000_000
 """A vehicle that nobody heard for so long is not waited for."""
+_BY_SIGHT_NS = 10_000_000_000
+"""In so long it has come down by the lines, from as high as anything is flown."""
+_LEFT_TO_AUTOPILOT_M = 0.4
+_SIGHT_S, _TOLD_S = 0.3, 0.2
+"""How old the floor's picture and the attitude may be to sink by them."""
 # constants: what is answered here calls as little as possible of what may have failed
 _WHY = Trigger.STEP_FAILED.value
 _ACTION = ACTIONS[Trigger.STEP_FAILED].value
@@ -67,15 +76,17 @@ class LastResort:
     """Answers a tick whose step has failed: tell it by `caught`, then ask for the `answer`.
 
     After the first failure the drone is levelled at the same height, and the mission is left to land it.  It
-    has `given_up` the mission once that fails again: what is in the air is kept level and sinks, and its
-    autopilot is told to land; a pilot who takes it keeps it; what was found flying is taken over first.
-    Nothing is armed, and what stands is disarmed."""
+    has `given_up` the mission once that fails again: what is in the air sinks at rest over the floor as long
+    as that can be steered without the mission, then it is kept level, and its autopilot is told to land; a
+    pilot who takes it keeps it; what was found flying is taken over first.  Nothing is armed, and what stands
+    is disarmed."""
 
     def __init__(self, params: MissionConfig) -> None:
         self._hold_ns = round(params.telemetry_hold_s * 1e9)
         self._sink_mps = params.land_mps
         self._end: Phase | None = None
         self._failures = 0
+        self._by_sight_until_ns: int | None = None
         self.failure: StepFailure | None = None
         """What the newest step raised, None where it raised nothing."""
         self.seen: VehicleState | None = None
@@ -102,12 +113,13 @@ class LastResort:
         last: TickOutput,
         drain_events: Callable[[], tuple[Event, ...]],
         drain_findings: Callable[[], tuple[tuple[Finding, ...], tuple[Settled, ...]]],
+        by_sight: Callable[[], AttitudeSetpoint | None],
     ) -> TickOutput:
-        """What goes out; `last` is what did before, the rest drains what the mission's parts still have to
-        tell."""
+        """What goes out; `last` is what did before, two drain what the mission's parts still have to tell,
+        `by_sight` is how it sinks at rest over the floor, None where that is not known."""
         answer = Fallback(last.phase, last.demand, last.setpoint and AttitudeSetpoint(tick.now_ns))
         if self.given_up:
-            answer = self.step(tick.now_ns, tick.vehicle, last.phase)
+            answer = self._sighted(tick.now_ns, self.step(tick.now_ns, tick.vehicle, last.phase), by_sight)
         no_events: tuple[Event, ...] = ()
         nothing: tuple[tuple[Finding, ...], tuple[Settled, ...]] = ((), ())
         findings, settled = _rescued(drain_findings, nothing)
@@ -137,6 +149,21 @@ class LastResort:
         standing = heard and vehicle.landed is LandedState.ON_GROUND
         return Fallback(Phase.LAND, Demand.DISARM if standing else Demand.LAND, sinking)
 
+    def _sighted(
+        self, now_ns: int, otherwise: Fallback, by_sight: Callable[[], AttitudeSetpoint | None]
+    ) -> Fallback:
+        """At rest over the floor in place of what is level; once that ends it stays so."""
+        if self._by_sight_until_ns is None:
+            self._by_sight_until_ns = now_ns + _BY_SIGHT_NS
+        if otherwise.setpoint is None or otherwise.demand is not Demand.LAND:
+            return otherwise
+        nothing: AttitudeSetpoint | None = None
+        setpoint = _rescued(by_sight, nothing) if now_ns < self._by_sight_until_ns else None
+        if setpoint is None:
+            self._by_sight_until_ns = 0
+            return otherwise
+        return Fallback(Phase.LAND, Demand.KEEP, setpoint)
+
     def _news(self, now_ns: int, before: Phase, after: Phase) -> tuple[Event, ...]:
         events = []
         if self.failure is not None:
@@ -145,6 +172,27 @@ class LastResort:
             events.append(Event(now_ns, EventLevel.WARNING, "hazard", f"{_WHY}: {_ACTION}"))
             events.append(Event(now_ns, EventLevel.WARNING, "phase", f"{before} -> {after}: {_WHY}"))
         return tuple(events)
+
+
+def sinking_by_sight(inputs: MissionInputs, sink_mps: float) -> Guidance | None:
+    """How it comes down at rest over the floor; None where the lines, the attitude, the height or the
+    vehicle tell too little for that, and low enough for the autopilot's own landing."""
+    vehicle, pose, warnings = inputs.vehicle, inputs.pose, inputs.warnings
+    if vehicle is None or pose is None:
+        return None
+    knows = (
+        vehicle.armed
+        and vehicle.in_control
+        and vehicle.landed is LandedState.IN_AIR
+        and inputs.sight_s < _SIGHT_S
+        and inputs.telemetry_age_s < _TOLD_S
+        and inputs.believed_height_m > _LEFT_TO_AUTOPILOT_M
+        and not (warnings.height_stuck or warnings.climb_wrong)
+    )
+    if not knows:
+        return None
+    reference = Reference(pose.x_m, pose.y_m, pose.yaw_rad, math.nan, climb_mps=-sink_mps)
+    return Guidance(Phase.LAND, Guide.BRAKE, reference, Demand.KEEP, dead_reckoned=True)
 
 
 def _silent_ns(now_ns: int, vehicle: VehicleState) -> int:

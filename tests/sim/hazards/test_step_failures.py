@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import itertools
+import math
 import os
 import random
 import sys
@@ -29,8 +30,9 @@ from flightd.core.flight_order import FlightOrder
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
-from flightd.core.types import HEALTHY, Command, CommandKind, EventLevel, Phase
+from flightd.core.types import HEALTHY, Command, CommandKind, Demand, EventLevel, Phase
 from flightd.mission.guidance import Guidance, MissionInputs
+from flightd.mission.mission import Mission
 from flightd.mission.reasons import in_words
 from flightd.mission.safety.last_resort import LastResort
 from flightd.pilot import Pilot
@@ -214,6 +216,19 @@ def is_level_and_comes_down(flown: Flown, outputs: Mapping[int, TickOutput], rai
     assert len(after) * TICK_NS < 20_000_000_000
     assert flown.phase in {Phase.DONE, Phase.ABORTED}
     assert flown.truth[-1][1].height_m < 0.2
+
+
+def test_without_its_mission_it_comes_to_rest_over_the_floor_and_sinks_there() -> None:
+    flown, kept, raised_ns = fly_with(Mission.step.__code__, 5.0, once=False)
+    ticks = [message.now_ns for topic, message in kept if topic == Topic.TICK]
+    outputs = dict(zip(ticks, flown.outputs, strict=True))
+    is_level_and_comes_down(flown, outputs, raised_ns)
+    after = [output for stamp_ns, output in outputs.items() if stamp_ns > raised_ns]
+    demands = [demand for demand, _ in itertools.groupby(output.demand for output in after)]
+    assert demands[:2] == [Demand.KEEP, Demand.LAND], "the last of it is the autopilot's own landing"
+    down = [truth for phase, truth in flown.truth if phase in {Phase.LAND, Phase.ABORTED}]
+    assert math.hypot(down[0].vx_mps, down[0].vy_mps) > 0.3, "it was on its way"
+    assert math.hypot(down[0].x_m - down[-1].x_m, down[0].y_m - down[-1].y_m) < 0.5
 
 
 class Broken:

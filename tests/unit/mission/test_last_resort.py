@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from flightd.core.tick import TickInput, TickOutput
-from flightd.core.types import Demand, GridPose, LandedState, Phase, VehicleState
+from flightd.core.types import AttitudeSetpoint, Demand, GridPose, LandedState, Phase, VehicleState
 from flightd.mission.event_log import EventLog
+from flightd.mission.guidance import Guide, MissionInputs, Warnings
 from flightd.mission.plan.flight_plan import make_plan
 from flightd.mission.plan.itinerary import Itinerary
-from flightd.mission.safety.last_resort import LastResort
+from flightd.mission.safety.last_resort import LastResort, sinking_by_sight
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import POLICY, SITE
 from tests.unit.mission.test_readiness import VEHICLE
@@ -76,12 +80,87 @@ def test_the_mission_is_given_up_at_its_second_failure() -> None:
     resort, flying = LastResort(configured().mission), TickInput(NOW_NS, vehicle=FLYING)
     last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, None, None)
     resort.caught(NOW_NS, ValueError("first"))
-    last = resort.answer(flying, last, tuple, lambda: ((), ()))
+    last = resort.answer(flying, last, tuple, lambda: ((), ()), lambda: None)
     assert (last.phase, last.demand, resort.given_up) == (Phase.FOLLOW, Demand.FLY, False)
     resort.caught(NOW_NS, ValueError("second"))
-    last = resort.answer(flying, last, tuple, lambda: ((), ()))
+    last = resort.answer(flying, last, tuple, lambda: ((), ()), lambda: None)
     assert (last.phase, last.demand, resort.given_up) == (Phase.LAND, Demand.LAND, True)
     assert [event.name for event in last.events] == ["step_failed", "hazard", "phase"]
+
+
+def test_without_the_mission_it_sinks_by_sight_once_and_never_again_after_that_has_failed() -> None:
+    resort, flying = LastResort(configured().mission), TickInput(NOW_NS, vehicle=FLYING)
+    for text in ("first", "second"):
+        resort.caught(NOW_NS, ValueError(text))
+    leaning = AttitudeSetpoint(NOW_NS, 0.05, climb_mps=-0.3)
+    last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, None, None)
+
+    def broken() -> AttitudeSetpoint:
+        raise ValueError("this, too")
+
+    def answered(by_sight: Callable[[], AttitudeSetpoint | None], now_ns: int = NOW_NS) -> TickOutput:
+        return resort.answer(replace(flying, now_ns=now_ns), last, tuple, lambda: ((), ()), by_sight)
+
+    assert (answered(lambda: leaning).setpoint, answered(lambda: leaning).demand) == (leaning, Demand.KEEP)
+    for by_sight in (broken, lambda: leaning):
+        level = answered(by_sight)
+        assert (level.demand, level.setpoint and level.setpoint.roll_rad) == (Demand.LAND, 0.0)
+
+
+def test_sinking_by_sight_ends_by_time() -> None:
+    resort = LastResort(configured().mission)
+    last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, None, None)
+    for text in ("first", "second"):
+        resort.caught(NOW_NS, ValueError(text))
+    demands = []
+    for now_s in (1, 10, 12):
+        now_ns = now_s * 10**9
+        heard = replace(VEHICLE.attitude, stamp_ns=now_ns)
+        vehicle = replace(FLYING, attitude=heard, heartbeat_ns=now_ns)
+        leaning = AttitudeSetpoint(now_ns, 0.05)
+        tick = TickInput(now_ns, vehicle=vehicle)
+        demands.append(resort.answer(tick, last, tuple, lambda: ((), ()), lambda: leaning).demand)  # noqa: B023
+    assert demands == [Demand.KEEP, Demand.KEEP, Demand.LAND]
+
+
+@pytest.mark.parametrize(
+    "less",
+    [
+        {"pose": None},
+        {"vehicle": None},
+        {"vehicle": VEHICLE},
+        {"vehicle": replace(FLYING, in_control=False)},
+        {"vehicle": replace(FLYING, landed=LandedState.ON_GROUND)},
+        {"x_age_s": 0.5, "y_age_s": 0.5},
+        {"telemetry_age_s": 0.3},
+        {"height_m": 0.3},
+        {"height_m": math.nan},
+        {"warnings": Warnings(height_stuck=True)},
+        {"warnings": Warnings(climb_wrong=True)},
+        {"warnings": Warnings(height_doubted=True, height_error_m=1.2)},
+    ],
+    ids=str,
+)
+def test_it_sinks_by_sight_only_where_sight_attitude_height_and_vehicle_tell_enough(
+    less: dict[str, Any],
+) -> None:
+    at_b = GridPose(0, "A2", 0, 0, 0.0, 3.0, 0.1, 0.4, 0, 1.5, (0.0,) * 9, 1.0)
+    known = MissionInputs(
+        now_ns=NOW_NS,
+        dt_s=0.02,
+        pose=at_b,
+        localised=True,
+        height_m=1.5,
+        frames_arrive=True,
+        x_age_s=0.1,
+        y_age_s=0.1,
+        telemetry_age_s=0.05,
+        vehicle=FLYING,
+    )
+    guidance = sinking_by_sight(known, 0.35)
+    assert guidance is not None
+    assert (guidance.guide, guidance.reference.climb_mps) == (Guide.BRAKE, -0.35)
+    assert sinking_by_sight(replace(known, **less), 0.35) is None
 
 
 def test_a_node_behind_a_barrier_leads_nowhere() -> None:
