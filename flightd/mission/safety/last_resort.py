@@ -66,6 +66,7 @@ class Fallback:
             reason=_WHY,
             pose=None,
             tracks=None,
+            shared=None,
             events=events,
             findings=findings,
             settled=settled,

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from flightd.core.shared_pose import SharedPose
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import AttitudeSetpoint, Demand, GridPose, LandedState, Phase, VehicleState
 from flightd.mission.event_log import EventLog
@@ -161,6 +162,18 @@ def test_it_sinks_by_sight_only_where_sight_attitude_height_and_vehicle_tell_eno
     assert guidance is not None
     assert (guidance.guide, guidance.reference.climb_mps) == (Guide.BRAKE, -0.35)
     assert sinking_by_sight(replace(known, **less), 0.35) is None
+
+
+def test_what_is_no_longer_known_is_told_to_nobody() -> None:
+    resort = LastResort(configured().mission)
+    shared = SharedPose(
+        1, VEHICLE.attitude, 0.0, 3.0, 0.0, 0.5, 0.0, 1.5, (1e-4, 1e-4), (1e-4, 1e-4), 1e-4, 1.0
+    )
+    at_a2 = GridPose(0, "A2", 0, 0, 0.0, 3.0, 0.1, 0.4, 0, 1.5, (0.0,) * 9, 1.0)
+    last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, at_a2, None, shared=shared)
+    resort.caught(NOW_NS, ValueError("first"))
+    answer = resort.answer(TickInput(NOW_NS, vehicle=FLYING), last, tuple, lambda: ((), ()), lambda: None)
+    assert (answer.pose, answer.tracks, answer.shared) == (None, None, None)
 
 
 def test_a_node_behind_a_barrier_leads_nowhere() -> None:
