@@ -9,13 +9,17 @@ from __future__ import annotations
 import enum
 import math
 import random
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from flightd.core.errors import InputError
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
+from flightd.sim.floor.misplaced_lines import misplaced
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.instruments import SensorParams
 from flightd.sim.sensors.optics import SimCamera
+from flightd.site.site import Site
 
 
 class WorldKind(enum.StrEnum):
@@ -42,6 +46,10 @@ class Unknowns:
     focal_share: float = 1.0
     shake_rad: float = 0.0
     """Rms of roll and pitch of each frame against the airframe."""
+    compass_rad: float = 0.0
+    """The most by which steel turns the compass."""
+    map_error_m: float = 0.0
+    """The most by which a painted line lies beside its place on the map."""
     tilt_bias_rad: tuple[float, float] | None = None
     """Roll and pitch told too large; None: the simulated autopilot's own small ones."""
     tilt_wander_rad: float = _SENSORS.tilt_wander_rad
@@ -73,10 +81,18 @@ class Unknowns:
             jitter_s=configured.jitter_s + self.camera_jitter_s,
         )
 
+    def floor(self, configured: Site, seed: int) -> Site:
+        """The floor as it is painted; as far from its map as it can be where lines come too close."""
+        for share in (1.0, 0.5, 0.25) if self.map_error_m else ():
+            with suppress(InputError):
+                return misplaced(configured, share * self.map_error_m, seed)
+        return configured
+
     def sensors(self, configured: SensorParams) -> SensorParams:
         """The autopilot's sensors as they really are."""
         return replace(
             configured,
+            compass_rad=self.compass_rad,
             tilt_bias=self.tilt_bias_rad,
             tilt_wander_rad=self.tilt_wander_rad,
             leak_s=self.leak_s,
@@ -113,6 +129,8 @@ class Spread:
     mount_yaw_deg: float
     focal_share: float
     shake_deg: float
+    compass_deg: float
+    map_m: float
     tilt_deg: float
     tilt_wander_deg: float
     leak_s: float
@@ -134,6 +152,8 @@ SPREADS = {
         mount_yaw_deg=2.0,
         focal_share=0.01,
         shake_deg=0.15,
+        compass_deg=5.0,
+        map_m=0.01,
         tilt_deg=0.5,
         tilt_wander_deg=0.15,
         leak_s=6.0,
@@ -153,6 +173,8 @@ SPREADS = {
         mount_yaw_deg=4.0,
         focal_share=0.04,
         shake_deg=0.5,
+        compass_deg=25.0,
+        map_m=0.05,
         tilt_deg=0.5,
         tilt_wander_deg=1.0,
         leak_s=2.0,
@@ -189,6 +211,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         mount_yaw_rad=math.radians(within(most.mount_yaw_deg)),
         focal_share=1.0 + within(most.focal_share),
         shake_rad=math.radians(most.shake_deg),
+        map_error_m=most.map_m,
         tilt_bias_rad=(math.radians(within(most.tilt_deg)), math.radians(within(most.tilt_deg))),
         tilt_wander_rad=math.radians(most.tilt_wander_deg),
         leak_s=most.leak_s,
@@ -200,6 +223,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         range_min_m=most.range_min_m,
         baro_wander_m=most.baro_m,
         hover_share=1.0 + within(most.hover_share),
+        compass_rad=math.radians(abs(within(most.compass_deg))),
     )
 
 

@@ -51,7 +51,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
     dead = _lasted([note for note in notes if note["kind"] == "companion_dead"])
     statuses = flown.messages(Status)
     evidence = FlightEvidence(
-        site=simulation.scenario.floor.site(simulation.site, simulation.seed),
+        site=simulation.painted_site,
         plan=meant.plan,
         statuses=statuses,
         events=flown.messages(Event),

@@ -58,6 +58,12 @@ class Simulation:
         """What it is flown by."""
         return FlightSetting(self.config, self.site, self.order or configured_order(self.config))
 
+    @property
+    def painted_site(self) -> Site:
+        """The site as it really is."""
+        configured = self.scenario.floor.site(self.site, self.seed)
+        return self.unknowns.floor(configured, self.seed)
+
     def plan(self) -> FlightPlan:
         """The plan of the flight at its start."""
         return plan_of(self.config, self.site, self.setting.order)
@@ -68,7 +74,7 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
     scenario, config = simulation.scenario, simulation.config
     adapter, order = config.vehicle.kind, simulation.setting.order
     return WorldSpec(
-        site=scenario.floor.site(simulation.site, simulation.seed),
+        site=simulation.painted_site,
         seed=simulation.seed,
         camera_address=("127.0.0.1", ports.camera),
         vehicle="px4" if adapter == "mavsdk" else adapter,

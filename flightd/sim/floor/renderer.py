@@ -24,7 +24,15 @@ from flightd.sim.floor.lighting import Lighting
 from flightd.sim.floor.tiles import Ahead, TiledFloor
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.camera_effects import Sensor, blur_kernel
-from flightd.sim.sensors.optics import Floats, RayTable, SimCamera, floor_viewpoint, picture_for, smear_px
+from flightd.sim.sensors.optics import (
+    Floats,
+    RayTable,
+    SimCamera,
+    floor_viewpoint,
+    moved,
+    picture_for,
+    smear_px,
+)
 from flightd.site.site import Site
 
 __all__ = ["Appearance", "Renderer", "SimCamera"]
@@ -67,7 +75,7 @@ class Renderer:
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
         picture = picture_for(self._camera.lens, out)
         view = floor_viewpoint(kinematics, self._camera.mount)
-        x_m, y_m = self._rays.floor(view)
+        x_m, y_m = self._looks_at(kinematics, view)
         foot, footprint_m = (view.x_m, view.y_m), self._rays.footprint_m(view)
         canvas, cells = self._tiles.look(x_m, y_m, foot, footprint_m)
         floor_map = self._rays.to_pixels(cells)
@@ -80,6 +88,17 @@ class Renderer:
         self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure)
         self._tiles.prepare(x_m, y_m, foot, footprint_m, _ahead(kinematics, view))
         return picture
+
+    def _looks_at(self, kinematics: Kinematics, view: Viewpoint) -> tuple[Floats, Floats]:
+        """The floor points of all cells, relative to the camera's foot."""
+        camera = self._camera
+        if not camera.readout_s:
+            return self._rays.floor(view)
+        first, last = (
+            floor_viewpoint(moved(kinematics, sign * camera.readout_s / 2), camera.mount)
+            for sign in (-1.0, 1.0)
+        )
+        return self._rays.rolled(view, first, last)
 
     def _smear(self, picture: Image, kinematics: Kinematics, exposure: float) -> None:
         across, down = smear_px(self._camera, kinematics) if self._look.motion_blur else (0.0, 0.0)

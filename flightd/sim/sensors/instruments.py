@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.plant.airframe import Airframe
+from flightd.sim.sensors.steel_field import SteelField
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +21,10 @@ class SensorParams:
     heading_offset_rad: float = 0.7
     yaw_drift_radps: float = math.radians(0.03)
     yaw_noise_rad: float = math.radians(0.1)
+    compass_rad: float = 0.0
+    """The most by which steel turns the compass at any place."""
+    compass_s: float = 5.0
+    """Within this time the estimator believes its compass rather than its gyro."""
     tilt_bias_rad: float = math.radians(0.3)
     tilt_bias: tuple[float, float] | None = None
     """Roll and pitch told too large (rad); None: drawn within `tilt_bias_rad`."""
@@ -77,6 +82,8 @@ class Sensors:
         self.aided = False
         """The estimator is told of its motion: it does not take what its accelerometers feel for the
         vertical."""
+        self._steel = SteelField(p.compass_rad, seed) if p.compass_rad else None
+        self._bent_rad: float | None = None
         self._yaw_drift = rng.uniform(-p.yaw_drift_radps, p.yaw_drift_radps)
         self._yaw_error = p.heading_offset_rad
         self._roll_wander = self._pitch_wander = self._baro_wander = self._climb_error = 0.0
@@ -112,7 +119,7 @@ class Sensors:
     @property
     def yaw_error_rad(self) -> float:
         """Estimate minus truth, the compass's heading of the map's x axis included."""
-        return self._yaw_error + self.fault.yaw_rad
+        return self._yaw_error + (self._bent_rad or 0.0) + self.fault.yaw_rad
 
     def update(self, dt_s: float, airframe: Airframe) -> None:
         """Follow the airframe's present truth after `dt_s`."""
@@ -125,6 +132,11 @@ class Sensors:
         fast = dt_s / 0.2
         self._climb_error += -self._climb_error * fast + gauss(0.0, p.climb_noise_mps * math.sqrt(2.0 * fast))
         self._yaw_error += self._yaw_drift * dt_s
+        if self._steel is not None:
+            read_rad = self._steel.error_rad(airframe.x_m, airframe.y_m)
+            if self._bent_rad is None:  # it was switched on here
+                self._bent_rad = read_rad
+            self._bent_rad += (read_rad - self._bent_rad) * dt_s / p.compass_s
         self._leak(dt_s, airframe)
         self.roll_rad = airframe.roll_rad + self.roll_error_rad
         self.pitch_rad = airframe.pitch_rad + self.pitch_error_rad

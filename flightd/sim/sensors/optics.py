@@ -38,7 +38,8 @@ def wide_lens(width_px: int = 640, height_px: int = 360, hfov_rad: float = math.
 @dataclass(frozen=True, slots=True)
 class SimCamera:
     """A down camera: its optics and its timing.  A frame reaches the daemon `capture_delay_s` after
-    mid-exposure, give or take a normal `jitter_s`."""
+    mid-exposure of the middle row, give or take a normal `jitter_s`; the rows are exposed one after the other
+    within `readout_s`."""
 
     lens: Lens = field(default_factory=wide_lens)
     mount: Mount = field(default_factory=Mount)
@@ -46,6 +47,7 @@ class SimCamera:
     exposure_s: float = 0.004
     capture_delay_s: float = 0.060
     jitter_s: float = 0.003
+    readout_s: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.exposure_s <= 1.0 / self.fps:
@@ -86,6 +88,16 @@ class RayTable:
         x = (a[0, 0] * right + a[0, 1] * down + a[0, 2]) * scale
         y = (a[1, 0] * right + a[1, 1] * down + a[1, 2]) * scale
         return x, y
+
+    def rolled(self, view: Viewpoint, first: Viewpoint, last: Viewpoint) -> tuple[Floats, Floats]:
+        """As `floor`, relative to the foot of `view`, where each row has its own time: the uppermost
+        looks from `first`, the lowest from `last`."""
+        rows_px = (np.arange(self._rays.shape[1]) - 0.5) * CELL_PX
+        late = np.clip(rows_px / self._lens.height_px, 0.0, 1.0).astype(np.float32)[:, None]
+        (x0, y0), (x1, y1) = self.floor(first), self.floor(last)
+        x0, x1 = x0 + np.float32(first.x_m - view.x_m), x1 + np.float32(last.x_m - view.x_m)
+        y0, y1 = y0 + np.float32(first.y_m - view.y_m), y1 + np.float32(last.y_m - view.y_m)
+        return x0 + late * (x1 - x0), y0 + late * (y1 - y0)
 
     def to_pixels(self, cells: Cells) -> Cells:
         """Cells interpolated to all pixels, (H, W, channels); of two channels it is a view that the next

@@ -23,6 +23,7 @@ from flightd.config.schema import load_config
 from flightd.core.types import Phase
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.unknowns import WorldKind, unknowns_of
+from flightd.site.site import Site
 from flightd.site.site_file import load_site
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight, rms_off_line
 
@@ -73,14 +74,16 @@ def flown_ideally(world: WorldKind, seed: int, nodes: str) -> Result:
     config, site = load_config(shipped("sim.toml")), load_site(shipped("site-demo.toml"))
     visits = tuple(nodes.split(",")) if nodes else ()
     wind, unknowns = WindParams(gust_rms_mps=_GUST_MPS), unknowns_of(world, seed)
-    flown = IdealFlight(site, config, visits=visits, seed=seed, wind=wind, unknowns=unknowns).fly(_LONGEST_S)
+    painted = unknowns.floor(site, seed)
+    flight = IdealFlight(site, config, visits=visits, seed=seed, wind=wind, unknowns=unknowns, world=painted)
+    flown = flight.fly(_LONGEST_S)
     end, pad = flown.truth[-1][1], site.nodes[site.home.node]
     completed = flown.phase is Phase.DONE
     return Result(
         seed=seed,
         completed=completed,
-        rms_m=rms_off_line(flown, site),
-        hover_p95_m=hover_p95_m(flown),
+        rms_m=rms_off_line(flown, painted),
+        hover_p95_m=hover_p95_m(flown, painted),
         landed_m=math.hypot(end.x_m - pad.x_m, end.y_m - pad.y_m) if completed else math.nan,
         miscounted=0,
         faults="",
@@ -88,9 +91,8 @@ def flown_ideally(world: WorldKind, seed: int, nodes: str) -> Result:
     )
 
 
-def hover_p95_m(flown: Flown) -> float:
+def hover_p95_m(flown: Flown, site: Site) -> float:
     """How far from its node the drone hovered, all but the worst twentieth; NaN where it never did."""
-    site = load_site(shipped("site-demo.toml"))
     off_m = [
         math.hypot(k.x_m - site.nodes[output.goal].x_m, k.y_m - site.nodes[output.goal].y_m)
         for output, (phase, k) in zip(flown.outputs, flown.truth, strict=True)

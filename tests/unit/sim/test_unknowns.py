@@ -7,11 +7,13 @@ import math
 import pytest
 
 from flightd.app.simulation.prepare import SimOptions
+from flightd.config.paths import shipped
 from flightd.core.errors import InputError
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.sensors.instruments import SensorParams
 from flightd.sim.sensors.optics import SimCamera
 from flightd.sim.unknowns import NOTHING, SPREADS, WorldKind, unknowns_of
+from flightd.site.site_file import load_site
 
 
 def test_the_ideal_world_keeps_nothing_to_itself() -> None:
@@ -36,8 +38,22 @@ def test_what_is_drawn_stays_within_its_world_and_reaches_what_it_is_of(kind: Wo
         assert abs(math.degrees(camera.mount.roll_rad)) <= most.mount_deg
         assert abs(camera.lens.fx_px / SimCamera().lens.fx_px - 1.0) <= most.focal_share
         assert one.sensors(SensorParams()).leak_s == most.leak_s
+        assert 0.0 <= one.sensors(SensorParams()).compass_rad <= math.radians(most.compass_deg)
         down_s, up_s = one.path_s
         assert down_s + up_s == pytest.approx(2.0 * most.path_s)
+
+
+def test_lines_lie_beside_their_places_by_what_the_world_allows_and_not_more() -> None:
+    site = load_site(shipped("site-demo.toml"))
+    assert NOTHING.floor(site, 3) is site
+    for kind in (WorldKind.USUAL, WorldKind.ROUGH):
+        most_m = SPREADS[kind].map_m
+        off_m = [
+            math.hypot(node.x_m - site.nodes[node.id].x_m, node.y_m - site.nodes[node.id].y_m)
+            for seed in range(10)
+            for node in unknowns_of(kind, seed).floor(site, seed).nodes.values()
+        ]
+        assert 0.7 * most_m < max(off_m) <= math.hypot(most_m, most_m)
 
 
 def test_an_airframe_that_there_is_not_is_refused() -> None:
