@@ -14,7 +14,7 @@ from flightd.core.geometry import Lens, Mount, ground_homography, heading_rotati
 from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.sensors.optics import SimCamera, wide_lens
+from flightd.sim.sensors.optics import SimCamera, moved, wide_lens
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, LineColour, Pad, Site
 from flightd.site.site_file import load_site
@@ -220,3 +220,18 @@ def test_worn_paint_is_partly_gone_and_noise_is_as_asked() -> None:
     noisy = Renderer(DEMO, SimCamera(), replace(CLEAN, noise=4.0), 1).render(hover(2.1, 0.0), 0)
     bare = np.abs(clean.astype(int) - clean[5, 100].astype(int)).max(axis=2) == 0
     assert noisy[bare].std(axis=0) == pytest.approx([4.0] * 3, rel=0.3)
+
+
+def test_with_a_rolling_shutter_each_row_is_seen_from_where_the_camera_was_then() -> None:
+    still = replace(CLEAN, motion_blur=False)
+    pose = hover(
+        2.7, 0.05, 1.4, vx_mps=0.8, vy_mps=-0.3, roll_rate_radps=0.5, yaw_rate_radps=0.4, yaw_rad=0.3
+    )
+    rolling = Renderer(DEMO, SimCamera(readout_s=0.02), still).render(pose, 0).astype(int)
+    at_once = Renderer(DEMO, SimCamera(), still)
+    rows = {-0.01: slice(0, 8), 0.0: slice(176, 184), 0.01: slice(352, 360)}
+    for dt_s, part in rows.items():
+        same = at_once.render(moved(pose, dt_s), 0).astype(int)[part]
+        others = [at_once.render(moved(pose, other), 0).astype(int)[part] for other in rows if other != dt_s]
+        off = np.abs(rolling[part] - same).mean()
+        assert off < 0.25 * min(np.abs(rolling[part] - other).mean() for other in others), dt_s
