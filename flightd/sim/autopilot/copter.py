@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.ports import Clock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
+from flightd.sim.autopilot.earth_field import earth_field_mgauss
 from flightd.sim.autopilot.external_vision import NOT_TAKEN, Taken
 from flightd.sim.autopilot.guided import AngleTarget
 from flightd.sim.autopilot.link import MavlinkChannel, Message
@@ -33,6 +34,8 @@ _FORCE = 21196
 _EXTERNAL = 6
 """EK3_SRC1_*: external navigation."""
 _LAGS = 100
+_FIELD_MGAUSS = 100.0
+"""ARMING_MAGTHRESH: north and east may differ by so much, down by twice that."""
 _ORIGIN_ID = dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN
 
 
@@ -149,8 +152,9 @@ class ArduCopterPeer(AutopilotPeer):
     def _arming_refusal(self) -> str | None:
         if not self.is_ready:
             return "PreArm: Gyros still settling"
-        if self.arming_block or (self.parameters["VISO_TYPE"] and not self.vision.is_heard):
-            return f"PreArm: {self.arming_block or 'VisOdom: not healthy'}"
+        unhealthy = self.arming_block or self._unhealthy()
+        if unhealthy:
+            return f"PreArm: {unhealthy}"
         if self.airframe.battery_v < self.parameters["BATT_LOW_VOLT"]:
             return "PreArm: Battery 1 below minimum arming voltage"
         if self.mode in _NOT_ARMABLE:
@@ -158,6 +162,22 @@ class ArduCopterPeer(AutopilotPeer):
         if self.mode in _NEEDS_POSITION and not self._config.has_position:
             return "PreArm: Need Position Estimate"
         return None
+
+    def _unhealthy(self) -> str:
+        """The sensor that is against arming; empty: none.  The compass is held against the earth's field of
+        where it believes to be, if anywhere."""
+        if self.parameters["VISO_TYPE"] and not self.vision.is_heard:
+            return "VisOdom: not healthy"
+        if self._origin is None:
+            return ""
+        felt = earth_field_mgauss(*self._config.place_deg)
+        expected = earth_field_mgauss(self._origin[0] * 1e-7, self._origin[1] * 1e-7)
+        north, east, down = (abs(a - b) for a, b in zip(felt, expected, strict=True))
+        if max(north, east) > _FIELD_MGAUSS:
+            return f"Check mag field (xy diff:{max(north, east):.0f}>{_FIELD_MGAUSS:.0f})"
+        if down > 2.0 * _FIELD_MGAUSS:
+            return f"Check mag field (z diff:{down:.0f}>{2.0 * _FIELD_MGAUSS:.0f})"
+        return ""
 
     def _on_disarmed(self) -> None:
         self.say(dialect.MAV_SEVERITY_INFO, "Disarming motors")
@@ -177,9 +197,9 @@ class ArduCopterPeer(AutopilotPeer):
         super().received(channel, message)
 
     def _taken(self) -> Taken:
-        """Its estimator wants an origin, and a place before it takes anything."""
+        """Its estimator takes a place before it takes anything, but wants no origin."""
         parameters = self.parameters
-        if not parameters["VISO_TYPE"] or self._origin is None:
+        if not parameters["VISO_TYPE"]:
             return NOT_TAKEN
         if parameters["EK3_SRC1_POSXY"] != _EXTERNAL:
             return NOT_TAKEN
