@@ -26,6 +26,8 @@ from flightd.sim.plant.airframe import Airframe, AirframeCommand
 _THRUST_IS_COLLECTIVE = 8
 _IDLE_COLLECTIVE = 0.05
 _LAND_DETECT_S = 1.0
+_PAUSE_S = 4.0
+"""A failsafe's landing holds the height for so long before it sinks."""
 _WATCH_S = 1.0 / 3.0
 """Failsafes of links are looked at in ArduCopter's loop of 3 Hz."""
 _GCS_LAND = 5
@@ -86,6 +88,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._low_battery_s = 0.0
         self._client_silent_s: float | None = None
         self._client_lost = False
+        self._pause_s = 0.0
         self._origin: tuple[int, int] | None = None
         self._pose_lags: deque[int] = deque(maxlen=_LAGS)
         self._watch_due_s = random.Random(config.seed).uniform(0.0, _WATCH_S)
@@ -115,8 +118,14 @@ class ArduCopterPeer(AutopilotPeer):
             self._target = AngleTarget(yaw_rad=self.sensors.yaw_rad)
             self._stick_yaw_rad = self.sensors.yaw_rad
             self._climb_loop.reset(self.sensors.height_m)
+            self._pause_s = 0.0
             self.link.broadcast(self._heartbeat())
         return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _land_by_failsafe(self) -> None:
+        if self.mode != CopterMode.LAND:
+            self._set_mode(CopterMode.LAND)
+            self._pause_s = _PAUSE_S
 
     def _command(self, command: int, params: tuple[float, ...]) -> int:
         match command:
@@ -242,7 +251,9 @@ class ArduCopterPeer(AutopilotPeer):
             climb_mps = target.climb_mps(up_mps, down_mps)
             return target.roll_rad, target.pitch_rad, target.yaw_rad, target.yaw_rate_radps, climb_mps
         if self.mode == CopterMode.LAND:
-            return 0.0, 0.0, self._stick_yaw_rad, 0.0, -self.parameters["LAND_SPEED"] / 100.0
+            self._pause_s -= dt_s
+            sink_mps = 0.0 if self._pause_s > 0.0 else self.parameters["LAND_SPEED"] / 100.0
+            return 0.0, 0.0, self._stick_yaw_rad, 0.0, -sink_mps
         sticks = self.sticks
         self._stick_yaw_rad += sticks.yaw_rate_radps * dt_s
         return sticks.roll_rad, sticks.pitch_rad, self._stick_yaw_rad, sticks.yaw_rate_radps, sticks.climb_mps
@@ -290,7 +301,7 @@ class ArduCopterPeer(AutopilotPeer):
         if self.armed and self._client_lost and not was_lost:
             self.say(dialect.MAV_SEVERITY_WARNING, "GCS Failsafe")
             if self.parameters["FS_GCS_ENABLE"] == _GCS_LAND:
-                self._set_mode(CopterMode.LAND)
+                self._land_by_failsafe()
 
     def _watch_battery(self, dt_s: float) -> None:
         """The failsafe for a voltage that stays low for so long."""
@@ -302,7 +313,7 @@ class ArduCopterPeer(AutopilotPeer):
             self._low_battery_told = True
             self.say(dialect.MAV_SEVERITY_CRITICAL, f"Battery 1 is low {self.airframe.battery_v:.2f}V")
             if self.parameters["BATT_FS_LOW_ACT"] == 1:
-                self._set_mode(CopterMode.LAND)
+                self._land_by_failsafe()
 
     # Reports
 
