@@ -8,11 +8,13 @@ and holds, it does not land; on the floor with nothing asked it disarms after DI
 from __future__ import annotations
 
 import enum
+import math
 import random
 from collections import deque
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.core.geometry import GRAVITY_MPS2
 from flightd.ports import Clock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.earth_field import earth_field_mgauss
@@ -32,6 +34,8 @@ _WATCH_S = 1.0 / 3.0
 """Failsafes of links are looked at in ArduCopter's loop of 3 Hz."""
 _GCS_LAND = 5
 """FS_GCS_ENABLE: land."""
+_BRAKE_RADPS, _BRAKE_RAD = 1.2, 0.25
+"""How soon a landing brakes the speed that is estimated, and the most it leans for that."""
 _FORCE = 21196
 _EXTERNAL = 6
 """EK3_SRC1_*: external navigation."""
@@ -253,10 +257,20 @@ class ArduCopterPeer(AutopilotPeer):
         if self.mode == CopterMode.LAND:
             self._pause_s -= dt_s
             sink_mps = 0.0 if self._pause_s > 0.0 else self.parameters["LAND_SPEED"] / 100.0
-            return 0.0, 0.0, self._stick_yaw_rad, 0.0, -sink_mps
+            return *self._braking(), self._stick_yaw_rad, 0.0, -sink_mps
         sticks = self.sticks
         self._stick_yaw_rad += sticks.yaw_rate_radps * dt_s
         return sticks.roll_rad, sticks.pitch_rad, self._stick_yaw_rad, sticks.yaw_rate_radps, sticks.climb_mps
+
+    def _braking(self) -> tuple[float, float]:
+        """Roll and pitch of a landing: against the estimated speed, level where none is estimated."""
+        speed = self.vision.speed_mps(self.airframe)
+        if speed is None:
+            return 0.0, 0.0
+        cos, sin = math.cos(self.airframe.yaw_rad), math.sin(self.airframe.yaw_rad)
+        ahead, aside = cos * speed[0] + sin * speed[1], -sin * speed[0] + cos * speed[1]
+        roll, pitch = -_BRAKE_RADPS * aside / GRAVITY_MPS2, _BRAKE_RADPS * ahead / GRAVITY_MPS2
+        return min(max(roll, -_BRAKE_RAD), _BRAKE_RAD), min(max(pitch, -_BRAKE_RAD), _BRAKE_RAD)
 
     def _raw_collective(self) -> float | None:
         """The setpoint's thrust where GUID_OPTIONS makes it collective, None where the height loop flies."""

@@ -149,6 +149,28 @@ def test_one_that_is_not_set_up_for_it_is_told_nothing_and_flies(
     virtual(test())
 
 
+@pytest.mark.parametrize(("viso", "least_m", "most_m"), [(1.0, 0.2, 2.0), (0.0, 2.5, 9.0)])
+def test_arducopter_brakes_when_its_companion_dies_only_if_it_took_our_motion(
+    viso: float, least_m: float, most_m: float
+) -> None:
+    async def test() -> None:
+        async with rig_of("ardupilot", VISO_TYPE=viso) as rig:
+            sharing = asyncio.create_task(share(rig, []))
+            try:
+                await rig.take_off()
+                await rig.stream(1.2, pitch_rad=-0.1)
+            finally:
+                sharing.cancel()
+            begun = rig.peer.truth()
+            assert math.hypot(begun.vx_mps, begun.vy_mps) > 0.6
+            rig.cut(True)
+            await rig.until(lambda: not rig.peer.armed, 20.0)
+            ended = rig.peer.truth()
+            assert least_m < math.hypot(ended.x_m - begun.x_m, ended.y_m - begun.y_m) < most_m
+
+    virtual(test())
+
+
 def test_arducopter_that_takes_our_motion_is_armed_wherever_on_earth_it_stands() -> None:
     async def test() -> None:
         async with rig_of("ardupilot", place_deg=CANBERRA_DEG) as rig:
