@@ -46,6 +46,7 @@ def rig_of(
     kind: Any,
     settings: Mapping[str, Any] = MappingProxyType({}),
     place_deg: tuple[float, float] = (51.4778, 0.0),
+    /,
     **parameters: float,
 ) -> Any:
     """An adapter as it is configured by default but for these settings, and a peer at a place on earth as it
@@ -173,7 +174,7 @@ def test_arducopter_brakes_when_its_companion_dies_only_if_it_took_our_motion(
 
 def test_arducopter_that_takes_our_motion_is_armed_wherever_on_earth_it_stands() -> None:
     async def test() -> None:
-        async with rig_of("ardupilot", place_deg=CANBERRA_DEG) as rig:
+        async with rig_of("ardupilot", {}, CANBERRA_DEG) as rig:
             sharing = asyncio.create_task(share(rig, []))
             try:
                 await rig.take_off()
