@@ -65,8 +65,8 @@ class VehicleConfig(Section):
         Annotated[float, Field(ge=-180, le=180)],
     ] = Field(
         (51.4778, 0.0),
-        description="ArduCopter that takes pose_output: the hall's latitude and longitude, roughly; its "
-        "estimator has to have some",
+        description="ArduCopter in flying_mode guided that takes pose_output: the hall's latitude and "
+        "longitude, roughly: its compass is held against the earth's field there before it arms",
     )
     range_finder: int | None = Field(
         None,

@@ -51,7 +51,8 @@ class PeerConfig:
 
     `remotes` are addresses it talks to unasked (a companion that only listens).  `ready_s` after boot
     it can be armed (a real one takes about 20 s).  Its boot clock runs `clock_ppm` fast.
-    It has no estimate of its position unless `has_position`.  `radio` lies between it and the companion,
+    It has no estimate of its position unless `has_position`, and stands at `place_deg` on earth (latitude
+    and longitude).  `radio` lies between it and the companion,
     `radio_up` on the way to it where that is another.
     """
 
@@ -61,6 +62,7 @@ class PeerConfig:
     system_id: int = 1
     ready_s: float = 3.0
     has_position: bool = False
+    place_deg: tuple[float, float] = (51.4778, 0.0)
     step_ns: int = 2_500_000
     clock_ppm: float = 20.0
     sensors: SensorParams = field(default_factory=SensorParams)

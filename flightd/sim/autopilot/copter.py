@@ -8,13 +8,16 @@ and holds, it does not land; on the floor with nothing asked it disarms after DI
 from __future__ import annotations
 
 import enum
+import math
 import random
 from collections import deque
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.core.geometry import GRAVITY_MPS2
 from flightd.ports import Clock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
+from flightd.sim.autopilot.earth_field import earth_field_mgauss
 from flightd.sim.autopilot.external_vision import NOT_TAKEN, Taken
 from flightd.sim.autopilot.guided import AngleTarget
 from flightd.sim.autopilot.link import MavlinkChannel, Message
@@ -25,14 +28,20 @@ from flightd.sim.plant.airframe import Airframe, AirframeCommand
 _THRUST_IS_COLLECTIVE = 8
 _IDLE_COLLECTIVE = 0.05
 _LAND_DETECT_S = 1.0
+_PAUSE_S = 4.0
+"""A failsafe's landing holds the height for so long before it sinks."""
 _WATCH_S = 1.0 / 3.0
 """Failsafes of links are looked at in ArduCopter's loop of 3 Hz."""
 _GCS_LAND = 5
 """FS_GCS_ENABLE: land."""
+_BRAKE_RADPS, _BRAKE_RAD = 1.2, 0.25
+"""How soon a landing brakes the speed that is estimated, and the most it leans for that."""
 _FORCE = 21196
 _EXTERNAL = 6
 """EK3_SRC1_*: external navigation."""
 _LAGS = 100
+_FIELD_MGAUSS = 100.0
+"""ARMING_MAGTHRESH: north and east may differ by so much, down by twice that."""
 _ORIGIN_ID = dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN
 
 
@@ -83,6 +92,7 @@ class ArduCopterPeer(AutopilotPeer):
         self._low_battery_s = 0.0
         self._client_silent_s: float | None = None
         self._client_lost = False
+        self._pause_s = 0.0
         self._origin: tuple[int, int] | None = None
         self._pose_lags: deque[int] = deque(maxlen=_LAGS)
         self._watch_due_s = random.Random(config.seed).uniform(0.0, _WATCH_S)
@@ -112,8 +122,14 @@ class ArduCopterPeer(AutopilotPeer):
             self._target = AngleTarget(yaw_rad=self.sensors.yaw_rad)
             self._stick_yaw_rad = self.sensors.yaw_rad
             self._climb_loop.reset(self.sensors.height_m)
+            self._pause_s = 0.0
             self.link.broadcast(self._heartbeat())
         return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _land_by_failsafe(self) -> None:
+        if self.mode != CopterMode.LAND:
+            self._set_mode(CopterMode.LAND)
+            self._pause_s = _PAUSE_S
 
     def _command(self, command: int, params: tuple[float, ...]) -> int:
         match command:
@@ -149,8 +165,9 @@ class ArduCopterPeer(AutopilotPeer):
     def _arming_refusal(self) -> str | None:
         if not self.is_ready:
             return "PreArm: Gyros still settling"
-        if self.arming_block or (self.parameters["VISO_TYPE"] and not self.vision.is_heard):
-            return f"PreArm: {self.arming_block or 'VisOdom: not healthy'}"
+        unhealthy = self.arming_block or self._unhealthy()
+        if unhealthy:
+            return f"PreArm: {unhealthy}"
         if self.airframe.battery_v < self.parameters["BATT_LOW_VOLT"]:
             return "PreArm: Battery 1 below minimum arming voltage"
         if self.mode in _NOT_ARMABLE:
@@ -158,6 +175,22 @@ class ArduCopterPeer(AutopilotPeer):
         if self.mode in _NEEDS_POSITION and not self._config.has_position:
             return "PreArm: Need Position Estimate"
         return None
+
+    def _unhealthy(self) -> str:
+        """The sensor that is against arming; empty: none.  The compass is held against the earth's field of
+        where it believes to be, if anywhere."""
+        if self.parameters["VISO_TYPE"] and not self.vision.is_heard:
+            return "VisOdom: not healthy"
+        if self._origin is None:
+            return ""
+        felt = earth_field_mgauss(*self._config.place_deg)
+        expected = earth_field_mgauss(self._origin[0] * 1e-7, self._origin[1] * 1e-7)
+        north, east, down = (abs(a - b) for a, b in zip(felt, expected, strict=True))
+        if max(north, east) > _FIELD_MGAUSS:
+            return f"Check mag field (xy diff:{max(north, east):.0f}>{_FIELD_MGAUSS:.0f})"
+        if down > 2.0 * _FIELD_MGAUSS:
+            return f"Check mag field (z diff:{down:.0f}>{2.0 * _FIELD_MGAUSS:.0f})"
+        return ""
 
     def _on_disarmed(self) -> None:
         self.say(dialect.MAV_SEVERITY_INFO, "Disarming motors")
@@ -177,9 +210,9 @@ class ArduCopterPeer(AutopilotPeer):
         super().received(channel, message)
 
     def _taken(self) -> Taken:
-        """Its estimator wants an origin, and a place before it takes anything."""
+        """Its estimator takes a place before it takes anything, but wants no origin."""
         parameters = self.parameters
-        if not parameters["VISO_TYPE"] or self._origin is None:
+        if not parameters["VISO_TYPE"]:
             return NOT_TAKEN
         if parameters["EK3_SRC1_POSXY"] != _EXTERNAL:
             return NOT_TAKEN
@@ -222,10 +255,22 @@ class ArduCopterPeer(AutopilotPeer):
             climb_mps = target.climb_mps(up_mps, down_mps)
             return target.roll_rad, target.pitch_rad, target.yaw_rad, target.yaw_rate_radps, climb_mps
         if self.mode == CopterMode.LAND:
-            return 0.0, 0.0, self._stick_yaw_rad, 0.0, -self.parameters["LAND_SPEED"] / 100.0
+            self._pause_s -= dt_s
+            sink_mps = 0.0 if self._pause_s > 0.0 else self.parameters["LAND_SPEED"] / 100.0
+            return *self._braking(), self._stick_yaw_rad, 0.0, -sink_mps
         sticks = self.sticks
         self._stick_yaw_rad += sticks.yaw_rate_radps * dt_s
         return sticks.roll_rad, sticks.pitch_rad, self._stick_yaw_rad, sticks.yaw_rate_radps, sticks.climb_mps
+
+    def _braking(self) -> tuple[float, float]:
+        """Roll and pitch of a landing: against the estimated speed, level where none is estimated."""
+        speed = self.vision.speed_mps(self.airframe)
+        if speed is None:
+            return 0.0, 0.0
+        cos, sin = math.cos(self.airframe.yaw_rad), math.sin(self.airframe.yaw_rad)
+        ahead, aside = cos * speed[0] + sin * speed[1], -sin * speed[0] + cos * speed[1]
+        roll, pitch = -_BRAKE_RADPS * aside / GRAVITY_MPS2, _BRAKE_RADPS * ahead / GRAVITY_MPS2
+        return min(max(roll, -_BRAKE_RAD), _BRAKE_RAD), min(max(pitch, -_BRAKE_RAD), _BRAKE_RAD)
 
     def _raw_collective(self) -> float | None:
         """The setpoint's thrust where GUID_OPTIONS makes it collective, None where the height loop flies."""
@@ -270,7 +315,7 @@ class ArduCopterPeer(AutopilotPeer):
         if self.armed and self._client_lost and not was_lost:
             self.say(dialect.MAV_SEVERITY_WARNING, "GCS Failsafe")
             if self.parameters["FS_GCS_ENABLE"] == _GCS_LAND:
-                self._set_mode(CopterMode.LAND)
+                self._land_by_failsafe()
 
     def _watch_battery(self, dt_s: float) -> None:
         """The failsafe for a voltage that stays low for so long."""
@@ -282,7 +327,7 @@ class ArduCopterPeer(AutopilotPeer):
             self._low_battery_told = True
             self.say(dialect.MAV_SEVERITY_CRITICAL, f"Battery 1 is low {self.airframe.battery_v:.2f}V")
             if self.parameters["BATT_FS_LOW_ACT"] == 1:
-                self._set_mode(CopterMode.LAND)
+                self._land_by_failsafe()
 
     # Reports
 

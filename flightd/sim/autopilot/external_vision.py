@@ -27,6 +27,8 @@ _PLACE_RADPS = 0.7
 _SPEED_GATE, _PLACE_GATE_M = 5.0, 1.0
 _STALE_S, _PLACE_REJECTED_S = 1.0, 5.0
 """Poses older, or rejected for longer, are given up: begun anew with the next."""
+_RECKONED_S = 15.0
+"""After the last pose the speed is dead-reckoned for so long."""
 _LONGEST_S = 0.2
 
 
@@ -66,13 +68,19 @@ class ExternalVision:
         """Its attitude rests on what it is told."""
         return self._fused_s < _STALE_S
 
+    def speed_mps(self, truth: Airframe) -> tuple[float, float] | None:
+        """As it is estimated, along true axes; None: it is not."""
+        if self._fused_s > _RECKONED_S:
+            return None
+        return truth.vx_mps + self._speed_error[0], truth.vy_mps + self._speed_error[1]
+
     def step(self, dt_s: float, truth: Airframe) -> None:
         """What the errors grow to by themselves."""
         self._heard_s += dt_s
         self._fused_s += dt_s
         self._placed_s += dt_s
         self._sensors.aided = self.aided
-        if not self.aided or truth.on_floor:
+        if self._fused_s > _RECKONED_S or truth.on_floor:
             self._speed_error = [0.0, 0.0]
             return
         roll, pitch = self._sensors.drift_rad

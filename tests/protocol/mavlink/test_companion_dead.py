@@ -42,6 +42,21 @@ def test_an_autopilot_as_it_is_shipped_lands_within_a_second_of_its_companions_d
     virtual(test())
 
 
+def test_arducopter_waits_four_seconds_at_its_height_before_a_failsafe_lands_it() -> None:
+    async def test() -> None:
+        async with ardupilot_rig() as rig:
+            await rig.take_off()
+            rig.cut(True)
+            await rig.until(lambda: rig.peer.mode == CopterMode.LAND, 3.0)
+            height_m = rig.peer.truth().height_m
+            await asyncio.sleep(3.5)
+            assert rig.peer.truth().height_m == pytest.approx(height_m, abs=0.1)
+            await asyncio.sleep(1.5)
+            assert rig.peer.truth().height_m < height_m - 0.3
+
+    virtual(test())
+
+
 def test_an_uplink_that_loses_two_of_five_is_no_dead_companion() -> None:
     """Of the heartbeats that half a second holds nine in a row may be lost."""
 

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.link.codec import Codec, FrameParser
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
+from flightd.adapters.vehicle.mavlink.required_parameters import Job
 from flightd.adapters.vehicle.mavlink.services.statustext import TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.core.geometry import wrap_pi
@@ -180,13 +181,20 @@ def test_the_motion_is_told_at_thirty_hertz_if_so_chosen_and_taken() -> None:
     virtual(test())
 
 
-def test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one() -> None:
+def test_guided_by_our_pose_gets_an_origin_until_it_reports_one() -> None:
     async def test() -> None:
-        for form, other in ((PoseForm.ODOMETRY, {}), (None, {}), (PoseForm.ODOMETRY, {"VISO_TYPE": 0.0})):
-            async with scripted(taking(**other), pose_form=form, origin_deg=(47.5, -8.25)) as (autopilot, _):
+        for form, guided, other in (
+            (PoseForm.ODOMETRY, True, {}),
+            (PoseForm.ODOMETRY, False, {}),
+            (None, True, {}),
+            (PoseForm.ODOMETRY, True, {"VISO_TYPE": 0.0}),
+        ):
+            async with scripted(
+                taking(**other), pose_form=form, origin_deg=(47.5, -8.25), job=Job(guided=guided)
+            ) as (autopilot, _):
                 await asyncio.sleep(9.0)
                 sent = autopilot.all("SET_GPS_GLOBAL_ORIGIN")
-                if form is None or other:
+                if form is None or other or not guided:
                     assert not sent
                     continue
                 assert len(sent) >= 2  # nobody answered

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -17,6 +18,7 @@ from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
 from flightd.adapters.vehicle.mavlink.pose_sharing import PoseSharing, pose_use
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.config.vehicle import PoseChoice, VehicleConfig
+from flightd.core.refusal import words
 from flightd.core.shared_pose import SharedPose
 from flightd.core.types import Attitude, Demand, LandedState, PoseUse, VehicleState
 from flightd.ports import PoseTaker
@@ -37,14 +39,30 @@ SHIPPED: dict[str, dict[str, float]] = {
 }
 
 
-def rig_of(kind: Any, **parameters: float) -> Any:
-    """An adapter as it is configured by default, and a peer as it is shipped but for these parameters."""
+CANBERRA_DEG = (-35.363262, 149.165237)
+
+
+def rig_of(
+    kind: Any,
+    settings: Mapping[str, Any] = MappingProxyType({}),
+    place_deg: tuple[float, float] = (51.4778, 0.0),
+    /,
+    **parameters: float,
+) -> Any:
+    """An adapter as it is configured by default but for these settings, and a peer at a place on earth as it
+    is shipped but for these parameters."""
     make_peer: Any = ArduCopterPeer if kind == "ardupilot" else Px4Peer
     mode = CopterMode.ALT_HOLD if kind == "ardupilot" else Px4Mode.ALTCTL
-    config = PeerConfig(ready_s=0.5, sensors=LEAKS, parameters=SHIPPED[kind] | parameters)
+    config = PeerConfig(
+        ready_s=0.5,
+        sensors=LEAKS,
+        has_position=settings.get("flying_mode") == "guided",
+        place_deg=place_deg,
+        parameters=SHIPPED[kind] | parameters,
+    )
 
     def connect(url: str, clock: LoopClock) -> ArduPilotVehicle | Px4Vehicle:
-        vehicle = connect_vehicle(VehicleConfig(kind=kind), clock, url=url)
+        vehicle = connect_vehicle(VehicleConfig(kind=kind, **settings), clock, url=url)
         assert isinstance(vehicle, ArduPilotVehicle | Px4Vehicle)
         return vehicle
 
@@ -128,6 +146,65 @@ def test_one_that_is_not_set_up_for_it_is_told_nothing_and_flies(
             assert rig.known().pose_use is PoseUse.NOT_TAKEN
             assert not rig.peer.vision.is_heard
             assert "does not take our motion" in "".join(rig.texts() or ())
+
+    virtual(test())
+
+
+@pytest.mark.parametrize(("viso", "least_m", "most_m"), [(1.0, 0.2, 2.0), (0.0, 2.5, 9.0)])
+def test_arducopter_brakes_when_its_companion_dies_only_if_it_took_our_motion(
+    viso: float, least_m: float, most_m: float
+) -> None:
+    async def test() -> None:
+        async with rig_of("ardupilot", VISO_TYPE=viso) as rig:
+            sharing = asyncio.create_task(share(rig, []))
+            try:
+                await rig.take_off()
+                await rig.stream(1.2, pitch_rad=-0.1)
+            finally:
+                sharing.cancel()
+            begun = rig.peer.truth()
+            assert math.hypot(begun.vx_mps, begun.vy_mps) > 0.6
+            rig.cut(True)
+            await rig.until(lambda: not rig.peer.armed, 20.0)
+            ended = rig.peer.truth()
+            assert least_m < math.hypot(ended.x_m - begun.x_m, ended.y_m - begun.y_m) < most_m
+
+    virtual(test())
+
+
+def test_arducopter_that_takes_our_motion_is_armed_wherever_on_earth_it_stands() -> None:
+    async def test() -> None:
+        async with rig_of("ardupilot", {}, CANBERRA_DEG) as rig:
+            sharing = asyncio.create_task(share(rig, []))
+            try:
+                await rig.take_off()
+                await rig.stream(1.0)
+                assert rig.known().pose_use is PoseUse.GIVEN
+                assert rig.peer.vision.aided
+            finally:
+                sharing.cancel()
+
+    virtual(test())
+
+
+@pytest.mark.parametrize(("settings", "armed"), [({}, False), ({"origin_deg": CANBERRA_DEG}, True)])
+def test_arducopter_in_guided_is_not_armed_by_an_origin_where_the_earths_field_is_another(
+    settings: dict[str, Any], armed: bool
+) -> None:
+    async def test() -> None:
+        guided = {"flying_mode": "guided"} | settings
+        async with rig_of("ardupilot", guided, CANBERRA_DEG) as rig:
+            sharing = asyncio.create_task(share(rig, []))
+            try:
+                await rig.until(lambda: rig.vehicle.state() is not None)
+                await asyncio.sleep(5.0)
+                rig.vehicle.demand(Demand.FLY)
+                await asyncio.sleep(5.0)
+                assert rig.peer.armed is armed
+                refusal = rig.known().refusal
+                assert armed or "Check mag field (z diff:" in words(refusal)
+            finally:
+                sharing.cancel()
 
     virtual(test())
 

@@ -56,7 +56,7 @@ class ArduPilotVehicle(MavlinkVehicle):
         self._raw_thrust = options.job.raw_thrust
         self._flies_raw = False
         self._origin: Origin | None = None
-        if options.pose_form is not None:
+        if options.job.guided and options.pose_form is not None:
             self._origin = Origin(
                 self.link,
                 self._commander,

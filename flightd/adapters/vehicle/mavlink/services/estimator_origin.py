@@ -1,7 +1,8 @@
 """The place on earth that ArduPilot's estimator ties its local frame to.
 
-Without GPS it has none until SET_GPS_GLOBAL_ORIGIN comes, and until then it uses no position from outside,
-however good.  Any plausible place will do: an origin that is set already stays.
+Its estimator fuses our motion without; GUIDED wants one.  Once it has one, arming compares the compass with
+the earth's field there, and its failsafe for a lost position begins to work: so none is given but to GUIDED,
+and it has to lie where the field is the hall's.  An origin that is set already stays.
 """
 
 from __future__ import annotations
