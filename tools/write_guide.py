@@ -76,6 +76,7 @@ def _worlds() -> str:
         ("camera: yaw of the mount, up to", "mount_yaw_deg", 1, "deg"),
         ("camera: focal length off by up to", "focal_share", 1e2, "%"),
         ("camera: shakes against the attitude, rms", "shake_deg", 1, "deg"),
+        ("camera: rows read out slower or faster by up to", "readout_s", 1e3, "ms"),
         ("map: each painted line beside its place by up to", "map_m", 1e2, "cm"),
         ("compass: turned by steel, place by place, by up to", "compass_deg", 1, "deg"),
         ("attitude: constant error, up to", "tilt_deg", 1, "deg"),

@@ -75,6 +75,12 @@ class CameraConfig(OpticsSection):
     latency_s: float = Field(
         0.060, ge=0, le=1, description="from mid-exposure to arrival, least delay of the path"
     )
+    readout_s: float = Field(
+        0.0,
+        ge=0,
+        le=0.1,
+        description="rolling shutter: from the exposure of the first row to that of the last; 0: all at once",
+    )
     exposure_s: ExposureTime = 0.0
     gain: Gain = None
     anti_flicker_hz: MainsHz = 0

@@ -110,6 +110,7 @@ class StateEstimator:
             self._config.tracking,
             self.learnt,
             camera.latency_s,
+            camera.readout_s,
         )
         view = camera.floor_reach(control.max_tilt_rad)
         self.localiser = GridLocaliser(self._site, node, view, self._config.localisation)

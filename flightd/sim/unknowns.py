@@ -48,6 +48,7 @@ class Unknowns:
     """Rms of roll and pitch of each frame against the airframe."""
     compass_rad: float = 0.0
     """The most by which steel turns the compass."""
+    readout_s: float = 0.0
     map_error_m: float = 0.0
     """The most by which a painted line lies beside its place on the map."""
     tilt_bias_rad: tuple[float, float] | None = None
@@ -79,6 +80,7 @@ class Unknowns:
             ),
             capture_delay_s=max(configured.capture_delay_s + self.camera_delay_s, 0.005),
             jitter_s=configured.jitter_s + self.camera_jitter_s,
+            readout_s=max(configured.readout_s + self.readout_s, 0.0),
         )
 
     def floor(self, configured: Site, seed: int) -> Site:
@@ -129,6 +131,7 @@ class Spread:
     mount_yaw_deg: float
     focal_share: float
     shake_deg: float
+    readout_s: float
     compass_deg: float
     map_m: float
     tilt_deg: float
@@ -152,6 +155,7 @@ SPREADS = {
         mount_yaw_deg=2.0,
         focal_share=0.01,
         shake_deg=0.15,
+        readout_s=0.005,
         compass_deg=5.0,
         map_m=0.01,
         tilt_deg=0.5,
@@ -173,6 +177,7 @@ SPREADS = {
         mount_yaw_deg=4.0,
         focal_share=0.04,
         shake_deg=0.5,
+        readout_s=0.015,
         compass_deg=25.0,
         map_m=0.05,
         tilt_deg=0.5,
@@ -224,6 +229,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         baro_wander_m=most.baro_m,
         hover_share=1.0 + within(most.hover_share),
         compass_rad=math.radians(abs(within(most.compass_deg))),
+        readout_s=within(most.readout_s),
     )
 
 

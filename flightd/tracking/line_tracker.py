@@ -10,18 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from flightd.config.control import TiltCompensation
 from flightd.config.tracking import TrackingConfig
 from flightd.core.geometry import Lens, Mount, wrap_pi
 from flightd.core.learnt import LearntSensors
 from flightd.core.tracks import NOT_SEEN, FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
-from flightd.core.types import Attitude, LineSet, MarkerSight, PadSight
+from flightd.core.types import Attitude, LineSet
 from flightd.tracking.attitude_history import AttitudeHistory
 from flightd.tracking.feature_trust import FeatureTrust
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.ground_junctions import floor_junctions
+from flightd.tracking.ground_squares import placed_squares
 from flightd.tracking.heading_dispute import HeadingDispute, Turned
 from flightd.tracking.line_sight import (
     FeatureSight,
@@ -47,12 +48,12 @@ from flightd.tracking.motion_model import (
     Told,
     lean,
 )
+from flightd.tracking.rolling_shutter import ImageMotion, as_of_one_moment
 from flightd.tracking.tilt_compensation import (
     FloorView,
     GroundLine,
     floor_points,
     ground_lines,
-    ground_point,
     heights_by_width,
 )
 from flightd.tracking.width_heights import WidthHeights
@@ -64,7 +65,6 @@ _ASSUMED_TILT_RAD = math.radians(2.0)
 _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
 _DEFAULTS = TrackingConfig()
-_Square = TypeVar("_Square", PadSight, MarkerSight)
 
 
 class Lead(NamedTuple):
@@ -108,12 +108,14 @@ class LineTracker:
         config: TrackingConfig = _DEFAULTS,
         learnt: LearntSensors | None = None,
         latency_s: float = math.inf,
+        readout_s: float = 0.0,
     ) -> None:
         """`learnt` is what another tracker has learnt of the same sensors, `latency_s` the delay that the
-        frames' stamps assume."""
+        frames' stamps assume, `readout_s` the time in which a picture's rows are exposed."""
         params = config.expert
         self._lens, self._mount, self._compensation = lens, mount, compensation
         self._line_width_m = line_width_m
+        self._readout_s = readout_s
         self._params = params
         self._start_yaw_rad = start_yaw_rad
         self._history = AttitudeHistory()
@@ -220,6 +222,7 @@ class LineTracker:
         self._filter.height_known_to(height_sigma_m / height_m)
         self._advance(stamp_ns)
         view = self._view(attitude, stamp_ns, height_m)
+        lines = self._as_of_one_moment(lines, attitude, stamp_ns, height_m)
         params, assumed = self._params, self._history.is_assumed(stamp_ns)
         low, high = (share * self._line_width_m for share in params.width_share)
         seen = ground_lines(lines.lines, view)
@@ -241,13 +244,24 @@ class LineTracker:
         self._trust.step(places, self._filter.speeds(stamp_ns), stamp_ns)
         self._seen_in = None if assumed else attitude
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
-        self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in _placed(lines.pads, view, yaw))
-        marks = _placed(lines.markers, view, yaw)
+        self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in placed_squares(lines.pads, view, yaw))
+        marks = placed_squares(lines.markers, view, yaw)
         self._markers = tuple(MarkerOffset(mark.id, x, y, side) for mark, x, y, side in marks)
         self._junctions = floor_junctions(lines.junctions, view, yaw)
         if sights:
             self._lines_ns = stamp_ns
         return True
+
+    def _as_of_one_moment(
+        self, lines: LineSet, attitude: Attitude, stamp_ns: int, height_m: float
+    ) -> LineSet:
+        if not self._readout_s:
+            return lines
+        held = self._filter
+        velocity = held.mean(VX), held.mean(VY)
+        yaw = attitude.yaw_rad + held.mean(PSI)
+        motion = ImageMotion.of(self._rates(stamp_ns), velocity, yaw, height_m, self._corrected_mount())
+        return as_of_one_moment(lines, self._lens, motion, self._readout_s)
 
     def exposure_motion(self, now_ns: int) -> ExposureMotion | None:
         """What the newest frame tells of the motion; None where it was laid over an attitude that was only
@@ -462,22 +476,6 @@ class LineTracker:
             held.turn_mount_by(self._dispute.error_rad)
         elif turned is Turned.HEADING:
             held.turn_to(held.mean(PSI) + self._dispute.error_rad, self._params.start_yaw_sigma_rad)
-
-
-def _placed(
-    squares: Iterable[_Square], view: FloorView, yaw_rad: float
-) -> list[tuple[_Square, float, float, float]]:
-    """Each square with its centre on the floor, in grid axes about the drone at the time of the frame, and
-    the length of its sides; without those that the view cannot place."""
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    found = []
-    for square in squares:
-        point = ground_point(square.x_px, square.y_px, view)
-        if point is not None:
-            forward, right, metres_per_px = point
-            x_m, y_m = cos * forward - sin * right, sin * forward + cos * right
-            found.append((square, x_m, y_m, square.side_px * metres_per_px))
-    return found
 
 
 def _moved(line: TrackedLine, across_m: float, along_m: float) -> TrackedLine:

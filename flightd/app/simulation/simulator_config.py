@@ -104,6 +104,7 @@ def _camera_keys(scenario: Scenario) -> dict[str, Any]:
     down, front = scenario.camera.camera(), scenario.front_camera.camera()
     return {
         **_calibration("camera", down),
+        "camera.readout_s": down.readout_s,
         **_calibration("front_camera", front),
         "front_camera.exposure_s": front.exposure_s,
         "front_camera.fps": front.fps,

@@ -96,7 +96,7 @@ class CameraScenario(Section):
     capture_delay_s: float = Field(0.060, ge=0, le=1)
     jitter_s: float = Field(0.003, ge=0, le=0.1)
     exposure_s: float = Field(0.004, gt=0, le=0.1)
-    readout_s: float = Field(0.0, ge=0, le=0.1)
+    readout_s: float = Field(0.015, ge=0, le=0.1)
 
     @model_validator(mode="after")
     def _exposure_fits(self) -> Self:
