@@ -133,4 +133,4 @@ def truth_of(simulation: Simulation) -> dict[str, LocationTruth]:
         return {}
     scenario = simulation.scenario
     focal_px = scenario.front_camera.camera().lens.fx_px
-    return stock_truth(simulation.site, scenario.racks.appearance(), focal_px, simulation.seed)
+    return stock_truth(simulation.painted_site, scenario.racks.appearance(), focal_px, simulation.seed)

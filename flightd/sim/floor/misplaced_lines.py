@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 from flightd.core.errors import InputError
 from flightd.site.layout import LayoutError
@@ -15,7 +16,7 @@ _TRIES = 50
 def misplaced(site: Site, most_m: float, seed: int) -> Site:
     """The site with each aisle line and each line across them up to `most_m` beside its place.
 
-    The lines of the home pad's node stay, since places are told from there; racks go with their aisles.
+    The lines of the home pad's node stay, since places are told from there, and racks stand where they stand.
     InputError where no such floor can be laid out."""
     rng = random.Random(f"misplaced lines {seed}")
     home = site.nodes[site.home.node]
@@ -30,7 +31,7 @@ def misplaced(site: Site, most_m: float, seed: int) -> Site:
             for node in column:
                 x_m[node] = site.nodes[node].x_m + (0.0 if home.id in column else off_m)
         try:
-            return moved(site, y_m, x_m)
+            return replace(moved(site, y_m, x_m), shelves=site.shelves, locations=site.locations)
         except LayoutError as err:
             problem = str(err)
     raise InputError(f"floor.map_error_m = {most_m}: no such floor can be laid out ({problem})")

@@ -69,4 +69,4 @@ def test_one_that_is_never_heard_again_comes_down_where_it_came_to_rest(tmp_path
 @pytest.mark.parametrize("turn_deg", [-25.0, 20.0])
 def test_a_knocked_camera_does_not_lead_it_off_the_line(tmp_path: Path, turn_deg: float) -> None:
     truth = flown_since(tmp_path, {"kind": "camera_turned", "turn_deg": turn_deg})
-    assert max(abs(k["y_m"]) for k in truth) < 0.4
+    assert max(abs(k["y_m"]) for k in truth) < 0.6, "half the way to a rack"

@@ -56,6 +56,13 @@ def test_lines_lie_beside_their_places_by_what_the_world_allows_and_not_more() -
         assert 0.7 * most_m < max(off_m) <= math.hypot(most_m, most_m)
 
 
+def test_racks_stand_where_they_stand_whatever_was_painted() -> None:
+    site = load_site(shipped("site-racks-small.toml"))
+    painted = unknowns_of(WorldKind.ROUGH, 3).floor(site, 3)
+    assert painted.nodes != site.nodes
+    assert (painted.shelves, painted.locations, painted.racks) == (site.shelves, site.locations, site.racks)
+
+
 def test_an_airframe_that_there_is_not_is_refused() -> None:
     with pytest.raises(InputError, match=r"--plant kite: no such airframe; give one of own, rotorpy"):
         SimOptions(plant="kite").check()
