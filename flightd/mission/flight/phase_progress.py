@@ -90,7 +90,10 @@ class PhaseProgress:
                 done, trigger = self._settled(s, turned and level, stands_s), Trigger.TURNED
             case Phase.FOLLOW:
                 there = self._rests_at((goal.x_m, goal.y_m))
-                done, trigger = self._settled(s, there), Trigger.ARRIVED
+                # before the next leg past a shelf it comes to stand anyway
+                leads_on = goal.sweep is not None and not goal.sweep.last and not state.returning
+                settle_s = 0.0 if leads_on else p.settle_s
+                done, trigger = self._settled(s, there, settle_s), Trigger.ARRIVED
             case Phase.HOVER | Phase.CLIMB | Phase.SCAN:
                 done, trigger = self._at_node(s, state.phase, state.returning)
             case _:

@@ -38,6 +38,20 @@ class Lane:
     places: tuple[Location, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """Past a lane from one node of its aisle to another, by their places along it."""
+
+    lane: Lane
+    start: int
+    target: int
+
+    def passed(self, nodes: Sequence[str]) -> tuple[str, ...]:
+        """The nodes that it leads over."""
+        step = 1 if self.target > self.start else -1
+        return tuple(nodes[i] for i in range(self.start, self.target + step, step))
+
+
 def told(lanes: Iterable[Lane]) -> tuple[PlannedSweep, ...]:
     """What is flown past and how, in words and numbers; lanes that are alike in many aisles are told once."""
     alike: dict[tuple[object, ...], list[Lane]] = {}
@@ -113,7 +127,7 @@ class SweepPlanner:
         nodes = [node.id for node in site.aisle_nodes(aisle)]
         counted = [code for code in wanted if site.locations[code].node in set(run)]
         lanes = [lane for lane in self.lanes(aisle, counted) if lane.speed.readable]
-        legs: list[SweepLeg] = []
+        ways: list[_Way] = []
         at = nodes.index(here)
         for lane in _ordered(lanes, yaw_rad, height_m):
             faced = [nodes.index(place.node) for place in lane.places]
@@ -122,11 +136,32 @@ class SweepPlanner:
                 continue
             near, far = (low, high) if abs(low - at) <= abs(high - at) else (high, low)
             for target in (near, far) if low < at < high else (far,):
-                step = 1 if target > at else -1
-                passed = tuple(nodes[i] for i in range(at, target + step, step))
-                legs.append(_leg(lane, passed))
+                ways.append(_Way(lane, at, target))
                 at = target
+        flown = [nodes.index(node) for node in run]
+        for end in (min(flown), max(flown)):
+            self._lead_over(nodes, ways, end)
+        legs = [_leg(way.lane, way.passed(nodes)) for way in ways]
         return (*legs[:-1], replace(legs[-1], last=True)) if legs else ()
+
+    def _lead_over(self, nodes: Sequence[str], ways: list[_Way], end: int) -> None:
+        """Fly one of the ways on over this node, beyond what is counted, sooner than visit it afterwards: the
+        last way where that ends there, and so need not come back."""
+        ends = [index for way in ways for index in (way.start, way.target)]
+        if not ends or min(ends) <= end <= max(ends):
+            return
+        outermost = max(ends) if end > max(ends) else min(ends)
+        turning = [k for k, way in enumerate(ways) if way.target == outermost]
+        if not turning:
+            return
+        k = turning[-1] if turning[-1] == len(ways) - 1 else turning[0]
+        flown = ways[k : k + 2]
+        low, high = min(end, outermost), max(end, outermost)
+        if all(self._is_open(nodes, low, high, way.lane) for way in flown):
+            ways[k : k + 2] = [
+                replace(flown[0], target=end),
+                *(replace(way, start=end) for way in flown[1:]),
+            ]
 
     def seconds(self, legs: Sequence[SweepLeg], pace: Pace, yaw_rad: float) -> float:
         """How long the legs take, from the flying height and `yaw_rad` on."""

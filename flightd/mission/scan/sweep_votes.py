@@ -9,13 +9,14 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 from flightd.config.scan import ScanConfig
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
-from flightd.mission.scan.location_votes import LocationVotes
+from flightd.mission.scan.location_votes import SEEN_EMPTY, LocationVotes
 
 _SEEN_SHARE = 0.6
 """Part of what can be seen of a place that a picture must show to say anything of it."""
@@ -53,6 +54,7 @@ class SweepVotes:
         self._fair_rad: list[float] = []
         self._whole_rad: list[float] = []
         self._unfair = self._occupied = self._empty = 0
+        self._whole_occupied = self._whole_empty = 0
         self._doubtful: set[str] = set()
         self.newest_ns = 0
         """When it was in a picture last; 0 before the first."""
@@ -80,6 +82,9 @@ class SweepVotes:
                 self._unfair += not fair
                 self._occupied += fair and place.occupancy in _OCCUPIED
                 self._empty += place.occupancy is Occupancy.EMPTY
+                if share >= _WHOLE_SHARE:
+                    self._whole_occupied += place.occupancy in _OCCUPIED
+                    self._whole_empty += place.occupancy is Occupancy.EMPTY
                 if fair:
                     self._fair_rad.append(bearing_rad)
                     self._whole_rad += [bearing_rad] * (share >= _WHOLE_SHARE)
@@ -119,6 +124,9 @@ class SweepVotes:
             return Undecided.TORN
         if self._votes.any_read:
             return Undecided.ONCE
+        if self._whole_empty >= sweep.unread_views and not self._whole_occupied:
+            # where the picture's edge cuts the place off, its neighbour's goods look like its own
+            return replace(found, state=LocationState.EMPTY, confidence=SEEN_EMPTY)
         if len(self._fair_rad) < sweep.unread_views:
             return Undecided.LIGHT if self._unfair else Undecided.UNSEEN
         if self._occupied and self._empty:

@@ -12,20 +12,57 @@ from flightd.app.build import scanner_of
 from flightd.config.battery import BatteryConfig
 from flightd.config.schema import Config
 from flightd.config.sweep import ScanMode
+from flightd.core.geometry import wrap_pi
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Settled
 from flightd.core.types import CommandKind, Event, LandedState, Phase
 from flightd.mission.plan.flight_plan import HeadingPolicy
+from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.scanner import Scanner
 from flightd.sim.plant.kinematics import Kinematics
+from flightd.site.site import Site
+from flightd.site.site_file import parse_site
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
 from tests.unit.mission.shelves import FITTED, SIGHT, SITE
 
 PLACES = tuple(SITE.locations)
-STOCK = {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in PLACES}
 PICTURE_NS = 240_000_000
+_SPACING = "[1.3, 1.3, 1.3, 1.3]"
+BARE_ENDS = parse_site(
+    """
+[site]
+name = "three aisles"
+ceiling_m = 6.0
+"""
+    + "".join(
+        f"""
+[[aisle]]
+id = "{aisle}"
+x_m = 0.0
+y_m = {y_m}
+spacing_m = {_SPACING}
+shelf_distance_m = 1.2
+shelf_height_m = 2.4
+"""
+        for aisle, y_m in (("A", 0.0), ("B", 3.4), ("C", 6.8))
+    )
+    + "".join(f'[[cross]]\nnodes = ["{a}{n}", "{b}{n}"]\n' for a, b in ("AB", "BC") for n in (1, 5))
+    + """
+[[rack]]
+bay_width_m = 1.3
+levels_m = [0.9, 1.8]
+positions = 2
+
+[[pad]]
+id = "home"
+node = "A1"
+size_m = 0.5
+""",
+    "three aisles",
+)
+"""The middle aisle has no shelves before its end nodes."""
 PASSING = {Phase.TURN, Phase.FOLLOW, Phase.HOVER}
 
 
@@ -39,16 +76,18 @@ def config() -> Config:
 
 
 class Sweep(Flight):
-    """The whole aisle of the small site, with an ideal front camera before a known stock."""
+    """All of a site, the small one unless told otherwise, with an ideal front camera before a known stock."""
 
-    def __init__(self, params: Config | None = None, stock: Stock | None = None) -> None:
+    def __init__(self, params: Config | None = None, stock: Stock | None = None, site: Site = SITE) -> None:
         params = params or config()
-        scanner = scanner_of(params, SITE)
+        scanner = scanner_of(params, site)
         assert isinstance(scanner, Scanner)
-        super().__init__(params, SITE, scanner)
-        assert HeadingPolicy.of(params) == HeadingPolicy.of(config())
+        super().__init__(params, site, scanner, HeadingPolicy.of(params))
         self.scanner = scanner
-        self.front = IdealFront(SITE, SIGHT, stock or Stock(STOCK))
+        self.front = IdealFront(site, SIGHT, stock or Stock(labels_of(site)))
+        self.legs: list[SweepLeg] = []
+        self.turned: list[tuple[str, float]] = []
+        """Each turn by more than a right angle: the goal that it is for, and by how much."""
         self.findings: list[Finding] = []
         self.settled: list[Settled] = []
         self.events: list[Event] = []
@@ -65,6 +104,7 @@ class Sweep(Flight):
         self.run(0.02, follow=False)
 
     def _tick(self) -> bool:
+        self._note_turn()
         self.phases.append(self.phase)
         if self.phase is Phase.SCAN:
             self.scanned.add(self.mission.goal.node)
@@ -107,6 +147,14 @@ class Sweep(Flight):
                 self.scanner.take(self.front.see(k, places, self.now_ns), here)
         return False
 
+    def _note_turn(self) -> None:
+        pose, goal = self.inputs.pose, self.mission.goal
+        if goal.sweep is not None and goal.sweep not in self.legs:
+            self.legs.append(goal.sweep)
+        if pose is not None and self.phase is Phase.TURN and self.phases[-1:] != [Phase.TURN]:
+            angle_rad = abs(wrap_pi(goal.yaw_rad - pose.yaw_rad))
+            self.turned += [(goal.node, angle_rad)] * (angle_rad > 1.6)
+
     @property
     def on_leg(self) -> bool:
         """Half-way along a leg past a shelf."""
@@ -119,6 +167,11 @@ class Sweep(Flight):
 
     def said(self, name: str) -> list[str]:
         return [event.text for event in self.events if event.name == name]
+
+
+def labels_of(site: Site) -> dict[str, list[Label]]:
+    """A code at each place."""
+    return {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in site.locations}
 
 
 def lit(codes: CodeSet, places: set[str]) -> CodeSet:
@@ -161,6 +214,19 @@ def test_what_views_leave_open_is_visited_by_stopping_in_the_best_order() -> Non
     assert flight.scanned == {"A2", "A4"}
 
 
+def test_aisle_after_aisle_is_flown_past_with_one_half_turn_each_and_no_way_out_to_bare_ends() -> None:
+    flight = Sweep(config().with_values(camera={"mount_yaw_deg": 90.0}), site=BARE_ENDS)
+    flight.fly(600.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert flight.states == dict.fromkeys(BARE_ENDS.locations, LocationState.READ)
+    assert set(flight.said("visited")) == set(BARE_ENDS.nodes)
+    assert len(flight.said("sweep")) == 3
+    assert not flight.scanned
+    assert [node[0] for node, _ in flight.turned] == ["A", "B", "C"], "from one side to the other"
+    over_end = [leg for leg in flight.legs if "B5" in leg.nodes]
+    assert len(over_end) == 2, "out and back, once"
+
+
 @pytest.mark.parametrize("kind", [CommandKind.PAUSE, CommandKind.HOME, CommandKind.LAND])
 def test_an_order_on_a_leg_acts_as_anywhere_else(kind: CommandKind) -> None:
     flight = Sweep()
@@ -190,8 +256,8 @@ def test_an_order_on_a_leg_acts_as_anywhere_else(kind: CommandKind) -> None:
 
 def test_a_battery_that_runs_low_on_the_way_leaves_the_rest_for_the_next() -> None:
     flight = Sweep(config().with_values(battery=BatteryConfig(swap=True)))
-    flight.fly(until=lambda: flight.on_leg and len(flight.findings) > 3)
-    flight.set(battery_frac=0.15)
+    flight.fly(until=lambda: flight.on_leg and len(flight.findings) > 6)
+    flight.set(battery_frac=0.19)
     flight.fly()
     flight.down()
     assert flight.phase is Phase.SWAP, flight.mission.reason

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -51,6 +52,7 @@ def state(found: Finding | Undecided) -> LocationState | Undecided:
     return found.state if isinstance(found, Finding) else found
 
 
+UNSURE_READ = read("109481000094", sure=False)
 NOTHING: Sequence[Sequence[PlacedRead]] = ((),) * 6
 
 
@@ -78,6 +80,34 @@ def test_two_codes_are_two_labels_only_where_a_view_shows_both() -> None:
 def test_one_label_read_differently_decides_nothing() -> None:
     one, two = [placed("P1")], [placed("P2")]
     assert verdict([one, one, two, two, (), ()]) is Undecided.TORN
+
+
+def test_half_a_code_at_the_pictures_edge_does_not_make_another_of_its_label() -> None:
+    """Cut off, an EAN-13 is read as a UPC-E whose check digit nothing vouches for."""
+    whole = [placed("4094819312344")]
+    half = [replace(placed("109481000094", sure=False), read=replace(UNSURE_READ, agreeing=2))]
+    found = verdict([whole, whole, whole, half])
+    assert isinstance(found, Finding)
+    assert [read.text for read in found.reads] == ["4094819312344"]
+    assert verdict([whole, whole, half]) is Undecided.TORN, "too few to overrule it"
+    assert verdict([whole, whole, whole, half, half]) is Undecided.TORN, "more than a slip"
+    beside = [replace(half[0], x_m=1.2)]
+    assert verdict([whole, whole, whole, beside]) is not LocationState.READ
+    assert verdict([whole, whole, whole, [placed("P2")]]) is Undecided.TORN, "vouched for, too"
+
+
+def test_a_neighbours_goods_in_a_cut_off_view_leave_an_empty_place_empty() -> None:
+    def seen(*views: tuple[float, Occupancy]) -> LocationState | Undecided:
+        votes = SweepVotes(CODE, "A2", PARAMS, 1.0)
+        for seq, (share, occupancy) in enumerate(views):
+            look = PlaceLook(CODE, QUAD, share, occupancy, f"picture {seq}")
+            votes.add(seq, pose(seq * 250_000_000), look, (), bearing_rad=math.radians(8.0 * seq))
+        return state(votes.verdict())
+
+    empty, unsure = (0.95, EMPTY), (1.0, UNSURE)
+    assert seen((0.7, GOODS), empty, unsure, empty, empty, empty) is LocationState.EMPTY
+    assert seen((0.7, GOODS), empty, unsure, empty, empty) is Undecided.UNSURE
+    assert seen((0.95, GOODS), empty, unsure, empty, empty, empty) is Undecided.UNSURE
 
 
 def test_empty_takes_as_many_views_as_at_a_stop() -> None:
@@ -176,6 +206,21 @@ def test_a_place_is_decided_once_it_has_been_flown_past() -> None:
     assert not passing.task.drain(), "it is still in the picture"
     assert passing.found() == {ONE: LocationState.READ, TWO: LocationState.READ}
     assert ONE not in passing.task.near(pose(passing.now_ns, height_m=0.9))
+
+
+def test_a_place_that_was_only_glimpsed_may_still_be_flown_past() -> None:
+    """On a turn before its leg, or while the drone gathers speed."""
+    flight = Passing()
+    flight.see({ONE: ["P1"]})
+    assert flight.found() == {}
+    for _ in range(4):
+        flight.see({ONE: ["P1"]})
+    assert flight.found() == {ONE: LocationState.READ}
+    assert ONE not in flight.task.undecided
+    flight.see({TWO: ["P2"]})
+    assert flight.found() == {}
+    flight.task.end()
+    assert flight.task.undecided[TWO] is Undecided.UNSEEN
 
 
 def test_one_code_at_two_neighbours_is_decided_at_neither() -> None:
