@@ -106,7 +106,9 @@ class SweepVotes:
             return self._with_codes(found)
         if not self._doubtful <= set(others):
             return Undecided.NOBODYS
-        return self._unread(found) if found.state in _UNREAD else found
+        if found.state not in _UNREAD:
+            return found
+        return self._empty_after_all(found) or self._unread(found)
 
     def _with_codes(self, found: Finding) -> Finding | Undecided:
         """Codes count that several views give; several of them, where a view shows each two together."""
@@ -117,6 +119,13 @@ class SweepVotes:
             return Undecided.APART
         return found
 
+    def _empty_after_all(self, found: Finding) -> Finding | None:
+        """An empty place beside goods: where the picture's edge cuts it off, they look like its own."""
+        enough = self._whole_empty >= self._params.sweep.unread_views and not self._whole_occupied
+        if not enough or self._votes.any_read:
+            return None
+        return replace(found, state=LocationState.EMPTY, confidence=SEEN_EMPTY)
+
     def _unread(self, found: Finding) -> Finding | Undecided:
         """Nothing is unreadable by few views, by bad light, or from one angle."""
         sweep = self._params.sweep
@@ -124,9 +133,6 @@ class SweepVotes:
             return Undecided.TORN
         if self._votes.any_read:
             return Undecided.ONCE
-        if self._whole_empty >= sweep.unread_views and not self._whole_occupied:
-            # where the picture's edge cuts the place off, its neighbour's goods look like its own
-            return replace(found, state=LocationState.EMPTY, confidence=SEEN_EMPTY)
         if len(self._fair_rad) < sweep.unread_views:
             return Undecided.LIGHT if self._unfair else Undecided.UNSEEN
         if self._occupied and self._empty:

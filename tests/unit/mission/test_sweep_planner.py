@@ -97,7 +97,9 @@ def test_a_leg_leads_on_over_an_end_node_without_shelves(here: str) -> None:
 
 
 def test_the_last_leg_does_it_where_it_need_not_come_back() -> None:
-    one = replace(BARE, locations={c: p for c, p in BARE.locations.items() if p.level == 1 and p.side == "left"})
+    one = replace(
+        BARE, locations={c: p for c, p in BARE.locations.items() if (p.side, p.level) == ("left", 1)}
+    )
     legs = sweeps(one).legs(NODES, frozenset(one.locations), "A1", -math.pi / 2, 0.9)
     assert [leg.nodes for leg in legs] == [NODES]
     three = replace(

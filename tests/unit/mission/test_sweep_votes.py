@@ -92,7 +92,7 @@ def test_half_a_code_at_the_pictures_edge_does_not_make_another_of_its_label() -
     assert verdict([whole, whole, half]) is Undecided.TORN, "too few to overrule it"
     assert verdict([whole, whole, whole, half, half]) is Undecided.TORN, "more than a slip"
     beside = [replace(half[0], x_m=1.2)]
-    assert verdict([whole, whole, whole, beside]) is not LocationState.READ
+    assert state(verdict([whole, whole, whole, beside])) is Undecided.APART
     assert verdict([whole, whole, whole, [placed("P2")]]) is Undecided.TORN, "vouched for, too"
 
 
