@@ -24,13 +24,18 @@ _READING_S = 0.8
 """At the end of the last leg past a shelf its pictures are still being read."""
 
 
+_LINGERS_M = 0.25
+"""So far on a leg's first place is still seen well enough to count."""
+
+
 class PhaseProgress:
     """The phase in hand: call `begin` when it changes, then `step` at each tick."""
 
     def __init__(self, config: Config, itinerary: Itinerary, scan: ShelfScan, scanner: AnyScanner) -> None:
         self._params = config.mission
         self._battery = config.battery
-        self._stands_s = config.scan.pictures / config.front_camera.fps
+        lingers_s = math.sqrt(2.0 * _LINGERS_M / config.mission.accel_mps2)
+        self._stands_s = config.scan.pictures / config.front_camera.fps - lingers_s
         self._itinerary = itinerary
         self._scan = scan
         self._scanner = scanner

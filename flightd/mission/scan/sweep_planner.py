@@ -135,12 +135,16 @@ class SweepPlanner:
             if high - low + 1 < _LEAST_NODES or not self._is_open(nodes, min(low, at), max(high, at), lane):
                 continue
             near, far = (low, high) if abs(low - at) <= abs(high - at) else (high, low)
+            if low < at < high and self._leads_on(nodes, ways, near):
+                ways[-1] = replace(ways[-1], target=near)
+                at = near
             for target in (near, far) if low < at < high else (far,):
                 ways.append(_Way(lane, at, target))
                 at = target
         flown = [nodes.index(node) for node in run]
         for end in (min(flown), max(flown)):
             self._lead_over(nodes, ways, end)
+        self._lead_out(nodes, ways)
         legs = [_leg(way.lane, way.passed(nodes)) for way in ways]
         return (*legs[:-1], replace(legs[-1], last=True)) if legs else ()
 
@@ -162,6 +166,31 @@ class SweepPlanner:
                 replace(flown[0], target=end),
                 *(replace(way, start=end) for way in flown[1:]),
             ]
+
+    def _lead_out(self, nodes: Sequence[str], ways: list[_Way]) -> None:
+        """Fly the last way on to the next node from which the aisle is left: any way on leads there, unless
+        something was left open."""
+        if not ways:
+            return
+        step = 1 if ways[-1].target > ways[-1].start else -1
+        ahead = range(ways[-1].target, len(nodes) if step > 0 else -1, step)
+        exits = (index for index in ahead if self._is_exit(nodes[index]))
+        target = next(exits, ways[-1].target)
+        if self._leads_on(nodes, ways, target):
+            ways[-1] = replace(ways[-1], target=target)
+
+    def _is_exit(self, node: str) -> bool:
+        nodes = self._site.nodes
+        return any(nodes[other].aisle != nodes[node].aisle for other in self._site.neighbours(node))
+
+    def _leads_on(self, nodes: Sequence[str], ways: Sequence[_Way], target: int) -> bool:
+        """Whether the last way may be flown on to there without stopping."""
+        if not ways or target == ways[-1].target:
+            return False
+        last = ways[-1]
+        low, high = min(last.target, target), max(last.target, target)
+        onwards = (target > last.target) == (last.target > last.start)
+        return onwards and self._is_open(nodes, low, high, last.lane)
 
     def seconds(self, legs: Sequence[SweepLeg], pace: Pace, yaw_rad: float) -> float:
         """How long the legs take, from the flying height and `yaw_rad` on."""

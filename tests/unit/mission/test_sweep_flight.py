@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -17,52 +18,18 @@ from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Settled
 from flightd.core.types import CommandKind, Event, LandedState, Phase
 from flightd.mission.plan.flight_plan import HeadingPolicy
+from flightd.mission.plan.leg_times import Pace, profile_s
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.scanner import Scanner
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.site.site import Site
-from flightd.site.site_file import parse_site
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
-from tests.unit.mission.shelves import FITTED, SIGHT, SITE
+from tests.unit.mission.shelves import BARE_ENDS, FITTED, SIGHT, SITE
 
 PLACES = tuple(SITE.locations)
 PICTURE_NS = 240_000_000
-_SPACING = "[1.3, 1.3, 1.3, 1.3]"
-BARE_ENDS = parse_site(
-    """
-[site]
-name = "three aisles"
-ceiling_m = 6.0
-"""
-    + "".join(
-        f"""
-[[aisle]]
-id = "{aisle}"
-x_m = 0.0
-y_m = {y_m}
-spacing_m = {_SPACING}
-shelf_distance_m = 1.2
-shelf_height_m = 2.4
-"""
-        for aisle, y_m in (("A", 0.0), ("B", 3.4), ("C", 6.8))
-    )
-    + "".join(f'[[cross]]\nnodes = ["{a}{n}", "{b}{n}"]\n' for a, b in ("AB", "BC") for n in (1, 5))
-    + """
-[[rack]]
-bay_width_m = 1.3
-levels_m = [0.9, 1.8]
-positions = 2
-
-[[pad]]
-id = "home"
-node = "A1"
-size_m = 0.5
-""",
-    "three aisles",
-)
-"""The middle aisle has no shelves before its end nodes."""
 PASSING = {Phase.TURN, Phase.FOLLOW, Phase.HOVER}
 
 
@@ -223,8 +190,26 @@ def test_aisle_after_aisle_is_flown_past_with_one_half_turn_each_and_no_way_out_
     assert len(flight.said("sweep")) == 3
     assert not flight.scanned
     assert [node[0] for node, _ in flight.turned] == ["A", "B", "C"], "from one side to the other"
-    over_end = [leg for leg in flight.legs if "B5" in leg.nodes]
-    assert len(over_end) == 2, "out and back, once"
+    assert len(flight.legs) == 12
+
+
+def test_between_two_legs_it_waits_for_nothing_but_height_and_heading() -> None:
+    """Where it comes to rest, and where it gathers speed, the places at the end are seen long enough."""
+    params = config()
+    flight = Sweep(params)
+    flight.fly()
+    pace = Pace.of(params.mission)
+    changes = [
+        (event.stamp_ns * 1e-9, event.text) for event in flight.events if event.name in {"phase", "swept"}
+    ]
+    begun = next(k for k, (_, text) in enumerate(changes) if "follow -> hover" in text)
+    over = next(k for k, (_, text) in enumerate(changes) if "to stop before" in text)
+    between = list(pairwise(changes[begun:over]))
+    turns_s = [end - start for (start, text), (end, _) in between if "-> turn" in text]
+    legs_s = [end - start for (start, text), (end, _) in between if "-> follow" in text]
+    assert len(turns_s) == len(legs_s) == 4
+    assert sorted(turns_s)[1] < pace.climb_s(0.9) - 0.2, "settled, from a decimetre before its height on"
+    assert sorted(legs_s)[1] < profile_s(3.9, pace.speed_mps, pace.accel_mps2) + 0.6
 
 
 @pytest.mark.parametrize("kind", [CommandKind.PAUSE, CommandKind.HOME, CommandKind.LAND])

@@ -22,7 +22,7 @@ from flightd.mission.scan.views import ViewPlanner
 from flightd.site.site import Side, Site
 from flightd.site.site_file import parse_site
 from tests.unit.mission.configured import configured
-from tests.unit.mission.shelves import SIGHT, SITE
+from tests.unit.mission.shelves import BARE_ENDS, SIGHT, SITE
 
 NODES = ("A1", "A2", "A3", "A4")
 ALL = frozenset(SITE.locations)
@@ -107,6 +107,26 @@ def test_the_last_leg_does_it_where_it_need_not_come_back() -> None:
     )
     legs = sweeps(three).legs(NODES, frozenset(three.locations), "A1", -math.pi / 2, 0.9)
     assert ["A4" in leg.nodes for leg in legs] == [False, False, True]
+
+
+def test_legs_end_where_the_next_begins_and_where_the_aisle_is_left() -> None:
+    planner, everything = sweeps(BARE_ENDS), frozenset(BARE_ENDS.locations)
+    legs = planner.legs(("B1", "B2", "B3", "B4", "B5"), everything, "B1", math.pi / 2, 0.9)
+    assert [(leg.nodes[0], leg.end) for leg in legs] == [
+        ("B1", "B5"),
+        ("B5", "B2"),
+        ("B2", "B4"),
+        ("B4", "B1"),  # nothing hangs before B1, but there the way to another aisle begins
+    ]
+    # one front is longer than the other: on to its end, not back to that first
+    legs = planner.legs(("C1", "C2", "C3", "C4", "C5"), everything, "C1", -math.pi / 2, 0.9)
+    assert [leg.side for leg in legs] == [Side.LEFT, Side.LEFT, Side.RIGHT, Side.RIGHT]
+    assert [(leg.nodes[0], leg.end) for leg in legs] == [
+        ("C1", "C4"),
+        ("C4", "C1"),
+        ("C1", "C5"),
+        ("C5", "C1"),
+    ]
 
 
 def test_levels_whose_places_fit_one_picture_are_flown_past_together() -> None:
