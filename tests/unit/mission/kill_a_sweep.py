@@ -17,6 +17,7 @@ import asyncio
 import json
 import os
 import random
+import select
 import signal
 import sqlite3
 import sys
@@ -30,12 +31,13 @@ from flightd.app.counting.store_writer import StoreWriter
 from flightd.core.inventory import Observation, PlannedLocation
 from flightd.core.types import Phase
 from flightd.runtime.clock import LoopClock
+from tests.rigs.event_loops import real
 from tests.sim.ideal.ideal_front import Label, Stock
 from tests.unit.mission.shelves import SITE
 from tests.unit.mission.test_sweep_flight import Sweep, labels_of
 
 _CHUNK_S = 0.2
-_PACE_S = 0.005
+_WRITING_S = 0.02
 _MOST_WRITES = 64
 
 
@@ -74,11 +76,11 @@ async def _count(store: SqliteStore, run: str) -> None:
                 writer.put(finding, finding.location.encode() * 50)
             for settled in flight.settled:
                 writer.settle(settled)
+            # in the air there are seconds for what is a moment here
+            await asyncio.sleep(_WRITING_S if flight.findings or flight.settled else 0.0)
             flight.findings, flight.settled = [], []
-            await asyncio.sleep(_PACE_S)
-            while writer.waiting:  # in the air there are seconds for what is a moment here
-                await asyncio.sleep(0.001)
         writing.cancel()
+        await asyncio.gather(writing, return_exceptions=True)
 
 
 def _killed(folder: Path, run: str, rng: random.Random) -> tuple[list[str], bool]:
@@ -88,19 +90,19 @@ def _killed(folder: Path, run: str, rng: random.Random) -> tuple[list[str], bool
     if child == 0:
         os.close(read_end)
         with ToldStore(folder, write_end) as store:
-            asyncio.run(_count(store, run))
+            real(_count(store, run))
         os._exit(0)
     os.close(write_end)
     lines: list[str] = []
     wait_s, writes = rng.uniform(0.0, 0.02), rng.randrange(_MOST_WRITES)
     with os.fdopen(read_end, "rb", buffering=0) as pipe:
         if writes == 0:
-            time.sleep(rng.uniform(0.0, 1.0))
+            select.select((), (), (), rng.uniform(0.0, 1.0))
         for line in pipe:
             lines.append(line.decode().strip())
             if len(lines) == writes:
                 break
-        time.sleep(wait_s)
+        select.select((), (), (), wait_s)
         os.kill(child, signal.SIGKILL)
         lines += pipe.read().decode().splitlines()
     _, status = os.waitpid(child, 0)
