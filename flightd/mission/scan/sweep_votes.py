@@ -138,9 +138,9 @@ class SweepVotes:
         if self._occupied and self._empty:
             return Undecided.UNSURE
         spread_rad = math.radians(sweep.unread_spread_deg)
-        if self._occupied < _LEAST_WHOLE:  # an empty place would have shown its deck to so many views
-            sure = len(self._whole_rad) >= sweep.unread_views and _spread(self._whole_rad) >= 2.0 * spread_rad
-            return found if sure else Undecided.UNSURE
+        if self._occupied < _LEAST_WHOLE:  # an empty place would have shown its deck to one of so many views
+            enough = len(self._whole_rad) >= sweep.unread_views and not self._empty
+            return found if enough and _spread(self._whole_rad) >= 2.0 * spread_rad else Undecided.UNSURE
         enough = len(self._whole_rad) >= _LEAST_WHOLE and _spread(self._fair_rad) >= spread_rad
         return found if enough else Undecided.UNSEEN
 

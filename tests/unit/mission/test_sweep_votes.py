@@ -53,6 +53,7 @@ def state(found: Finding | Undecided) -> LocationState | Undecided:
 
 
 UNSURE_READ = read("109481000094", sure=False)
+NOTHING_AT_ALL: Sequence[Sequence[PlacedRead]] = ((),) * 8
 NOTHING: Sequence[Sequence[PlacedRead]] = ((),) * 6
 
 
@@ -125,6 +126,14 @@ def test_unreadable_takes_goods_enough_views_angles_and_light() -> None:
     assert verdict(NOTHING, light=Light.BURNT) is Undecided.LIGHT
     assert verdict(NOTHING, (UNSURE,) * 6, step_deg=3.0) is Undecided.UNSURE
     assert state(verdict(NOTHING, (UNSURE,) * 6)) is LocationState.UNREADABLE
+
+
+def test_what_looked_empty_to_some_views_is_not_said_to_be_unreadable() -> None:
+    unsure = (UNSURE,) * 8
+    assert state(verdict(NOTHING_AT_ALL, unsure)) is LocationState.UNREADABLE
+    for empty in (1, 2):
+        seen = (*unsure[empty:], *(EMPTY,) * empty)
+        assert state(verdict(NOTHING_AT_ALL, seen)) is Undecided.UNSURE
 
 
 def test_a_code_that_may_be_a_neighbours_leaves_no_place_without_a_code() -> None:
