@@ -50,7 +50,7 @@ def spent(events: Iterable[Event]) -> dict[str, tuple[float, int]]:
     now, next_, left = _WAYS, _WAYS, set[str]()
     phase, since_ns = "", 0
     for event in events:
-        if event.name == "swept":
+        if event.name == "swept" and next_ is _LEGS:
             next_ = _WAYS
         elif event.name == "sweep":  # it comes before the phase that it leads to
             stops = event.text.endswith(_STOPS)

@@ -27,6 +27,7 @@ from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
 from tests.unit.mission.shelves import BARE_ENDS, FITTED, SIGHT, SITE
+from tools.sweep_time import spent
 
 PLACES = tuple(SITE.locations)
 PICTURE_NS = 240_000_000
@@ -179,6 +180,13 @@ def test_what_views_leave_open_is_visited_by_stopping_in_the_best_order() -> Non
     # it ends its legs over A1, where the pad is: there is no way but out and back
     assert "A2, A4 to stop at" in flight.said("sweep")
     assert flight.scanned == {"A2", "A4"}
+    # and that is where its time went
+    times = spent(flight.events)
+    began, *_, ended = (event.stamp_ns for event in flight.events if event.name == "phase")
+    assert sum(seconds for seconds, _ in times.values()) == pytest.approx((ended - began) * 1e-9, abs=1.0)
+    assert times["legs past shelves"][1] == 4
+    assert times["stops before what was left open"][1] >= 4
+    assert "nodes that are not flown past" not in times
 
 
 def test_aisle_after_aisle_is_flown_past_with_one_half_turn_each_and_no_way_out_to_bare_ends() -> None:
