@@ -4,7 +4,7 @@ A generated aisle with racks on both sides, four levels and two places to a bay 
 simulation.  `--site` flies another site instead.
 
 python -m tools.bench_sweep [--nodes N] [--seed N] [--site FILE] [--mode stop|sweep]… [--out DIR]
-    [--set KEY=VALUE]…
+    [--world usual|rough|ideal] [--set KEY=VALUE]…
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from flightd.core.topics import Topic
 from flightd.core.types import Event
 from flightd.replay.log import read_log
 from flightd.site.site_file import load_site
+from tools.sweep_time import spent, table
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "configs" / "sim.toml"
@@ -69,18 +70,22 @@ size_m = 0.5
 """
 
 
-def flown(mode: str, site: Path, out: Path, seed: int, settings: list[str]) -> dict[str, Any]:
+def flown(mode: str, site: Path, out: Path, seed: int, world: str, settings: list[str]) -> dict[str, Any]:
     """The summary of one flight, with what it left for a stop."""
     values = [f'scan.mode="{mode}"', *settings]
     options = [word for value in values for word in ("--set", value)]
-    where = ("--warehouse", str(site), "--seed", str(seed), "--out", str(out), "--json")
+    where = ("--warehouse", str(site), "--seed", str(seed), "--world", world, "--out", str(out), "--json")
     command = [sys.executable, "-m", "flightd", "sim", *where, *options]
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)  # noqa: S603 - our own
     if not done.stdout:
         raise SystemExit(f"bench_sweep: the flight by {mode} failed: exit {done.returncode}")
     summary: dict[str, Any] = json.loads(done.stdout)
     events = read_log(out / "flight.mcap", {Topic.EVENT}).messages(Event)
-    return summary | {"left": [event.text for event in events if event.name == "swept"]}
+    said = list(events)
+    return summary | {
+        "left": [event.text for event in said if event.name == "swept"],
+        "time": table(spent(said)),
+    }
 
 
 def told(site: Path) -> list[str]:
@@ -97,6 +102,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=3)
     parser.add_argument("--site", type=Path)
     parser.add_argument("--mode", action="append", choices=("stop", "sweep"))
+    parser.add_argument("--world", default="usual", choices=("usual", "rough", "ideal"))
     parser.add_argument("--out", type=Path)
     parser.add_argument("--set", action="append", default=[], dest="settings")
     asked = parser.parse_args()
@@ -110,7 +116,8 @@ def main() -> None:
         print(f"in passing, {text}")
     modes = asked.mode or ["stop", "sweep"]
     by_mode = {
-        mode: flown(mode, site.resolve(), out.resolve() / mode, asked.seed, asked.settings) for mode in modes
+        mode: flown(mode, site.resolve(), out.resolve() / mode, asked.seed, asked.world, asked.settings)
+        for mode in modes
     }
     print("| | " + " | ".join(modes) + " |\n|---|" + "---|" * len(modes))
     for name, of in ROWS:
@@ -118,6 +125,7 @@ def main() -> None:
     for mode in modes:
         for text in by_mode[mode]["left"]:
             print(f"{mode}: {text}")
+        print(f"{mode}: {by_mode[mode]['time']}")
 
 
 if __name__ == "__main__":

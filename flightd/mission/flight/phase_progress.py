@@ -24,13 +24,18 @@ _READING_S = 0.8
 """At the end of the last leg past a shelf its pictures are still being read."""
 
 
+_LINGERS_M = 0.25
+"""So far on a leg's first place is still seen well enough to count."""
+
+
 class PhaseProgress:
     """The phase in hand: call `begin` when it changes, then `step` at each tick."""
 
     def __init__(self, config: Config, itinerary: Itinerary, scan: ShelfScan, scanner: AnyScanner) -> None:
         self._params = config.mission
         self._battery = config.battery
-        self._stands_s = config.scan.pictures / config.front_camera.fps
+        lingers_s = math.sqrt(2.0 * _LINGERS_M / config.mission.accel_mps2)
+        self._stands_s = config.scan.pictures / config.front_camera.fps - lingers_s
         self._itinerary = itinerary
         self._scan = scan
         self._scanner = scanner
@@ -90,7 +95,10 @@ class PhaseProgress:
                 done, trigger = self._settled(s, turned and level, stands_s), Trigger.TURNED
             case Phase.FOLLOW:
                 there = self._rests_at((goal.x_m, goal.y_m))
-                done, trigger = self._settled(s, there), Trigger.ARRIVED
+                # before the next leg past a shelf it comes to stand anyway
+                leads_on = goal.sweep is not None and not goal.sweep.last and not state.returning
+                settle_s = 0.0 if leads_on else p.settle_s
+                done, trigger = self._settled(s, there, settle_s), Trigger.ARRIVED
             case Phase.HOVER | Phase.CLIMB | Phase.SCAN:
                 done, trigger = self._at_node(s, state.phase, state.returning)
             case _:

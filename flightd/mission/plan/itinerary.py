@@ -119,13 +119,16 @@ class Itinerary:
         return self._left_over or (*self._run_left, *ahead)
 
     def advance(self, pose: GridPose | None, *, either_side: bool) -> None:
-        """Go on to the next stop; backwards where that saves half a turn and `either_side` of the aisle may
-        be faced: along an aisle with the nose to the shelf, after a scan that ended facing one of them."""
+        """Go on to the next stop; backwards where that saves half a turn: from aisle to aisle with the nose
+        to the shelf within them, and along one where `either_side` may be faced, after a scan that ended
+        facing one of them."""
         before, stop = self.goal, self.next_stop
-        sideways = self._site.nodes[before.node].aisle == self._site.nodes[stop.node].aisle
         self._next += 1
-        either_side = either_side and stop.sweep is None
-        if not either_side or not sideways or self._policy.heading is not Heading.SHELF or pose is None:
+        if self._policy.heading is not Heading.SHELF or pose is None or stop.sweep is not None:
+            return
+        sideways = self._site.nodes[before.node].aisle == self._site.nodes[stop.node].aisle
+        goes = stop.visit or stop.node != before.node
+        if sideways and goes and not either_side and before.sweep is None:
             return
         if abs(wrap_pi(stop.yaw_rad - pose.yaw_rad)) > math.pi * 0.75:
             self._stops[self._next] = replace(stop, yaw_rad=wrap_pi(stop.yaw_rad + math.pi))

@@ -35,6 +35,10 @@ class CodeVotes:
             self._frames.setdefault(code, set()).add(frame_seq)
         return new
 
+    def frames(self, placed: PlacedRead) -> int:
+        """How many frames gave a code."""
+        return len(self._frames.get((placed.read.symbology, placed.read.text), ()))
+
     def believed(self) -> tuple[PlacedRead, ...]:
         """One read for each code that is believed, the most often seen first; `agreeing` counts frames
         (or the looks at one frame, where those were more)."""

@@ -23,7 +23,7 @@ _LEAST_EMPTY = 2
 _OCCUPIED = (Occupancy.GOODS, Occupancy.COVERED)
 _SURE_TEXT = 0.999
 _AGREED_TEXT = 0.99
-_SEEN_EMPTY = 0.995
+SEEN_EMPTY = 0.995
 _NO_CODE = 0.9
 
 
@@ -92,7 +92,7 @@ class LocationVotes:
             settled = self._enough and self._quiet >= 2 and self._agreed(believed)
             return self._with_codes(believed, self._pose) if settled or final else None
         if self._is_empty(final):
-            return self._found(LocationState.EMPTY, _SEEN_EMPTY, self._pose)
+            return self._found(LocationState.EMPTY, SEEN_EMPTY, self._pose)
         if not final or not self.looks:
             return None
         covered = self._seen[Occupancy.COVERED]
@@ -147,11 +147,19 @@ class LocationVotes:
     def _believed(self) -> tuple[tuple[PlacedRead, ...], bool]:
         """The reads that count, and whether one label was read as different texts: then none counts."""
         believed = self._votes.believed()
+        often = [one for one in believed if one.read.sure and self._votes.frames(one) >= self._least]
+        believed = tuple(one for one in believed if not any(self._is_slip(one, other) for other in often))
         torn = any(
             one.read.text != other.read.text and _is_one_label(one, other)
             for one, other in combinations(believed, 2)
         )
         return (() if torn else believed), torn
+
+    def _is_slip(self, one: PlacedRead, other: PlacedRead) -> bool:
+        """Whether the label that is `other`, vouched for by its checksum in several frames, was misread in a
+        single one: half of an EAN-13 that the picture's edge cuts off is a UPC-E by its bars."""
+        once = not one.read.sure and self._votes.frames(one) == 1
+        return once and one.read.text != other.read.text and _is_one_label(one, other)
 
 
 def _is_one_label(one: PlacedRead, other: PlacedRead) -> bool:

@@ -38,6 +38,20 @@ class Lane:
     places: tuple[Location, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """Past a lane from one node of its aisle to another, by their places along it."""
+
+    lane: Lane
+    start: int
+    target: int
+
+    def passed(self, nodes: Sequence[str]) -> tuple[str, ...]:
+        """The nodes that it leads over."""
+        step = 1 if self.target > self.start else -1
+        return tuple(nodes[i] for i in range(self.start, self.target + step, step))
+
+
 def told(lanes: Iterable[Lane]) -> tuple[PlannedSweep, ...]:
     """What is flown past and how, in words and numbers; lanes that are alike in many aisles are told once."""
     alike: dict[tuple[object, ...], list[Lane]] = {}
@@ -113,7 +127,7 @@ class SweepPlanner:
         nodes = [node.id for node in site.aisle_nodes(aisle)]
         counted = [code for code in wanted if site.locations[code].node in set(run)]
         lanes = [lane for lane in self.lanes(aisle, counted) if lane.speed.readable]
-        legs: list[SweepLeg] = []
+        ways: list[_Way] = []
         at = nodes.index(here)
         for lane in _ordered(lanes, yaw_rad, height_m):
             faced = [nodes.index(place.node) for place in lane.places]
@@ -121,12 +135,62 @@ class SweepPlanner:
             if high - low + 1 < _LEAST_NODES or not self._is_open(nodes, min(low, at), max(high, at), lane):
                 continue
             near, far = (low, high) if abs(low - at) <= abs(high - at) else (high, low)
+            if low < at < high and self._leads_on(nodes, ways, near):
+                ways[-1] = replace(ways[-1], target=near)
+                at = near
             for target in (near, far) if low < at < high else (far,):
-                step = 1 if target > at else -1
-                passed = tuple(nodes[i] for i in range(at, target + step, step))
-                legs.append(_leg(lane, passed))
+                ways.append(_Way(lane, at, target))
                 at = target
+        flown = [nodes.index(node) for node in run]
+        for end in (min(flown), max(flown)):
+            self._lead_over(nodes, ways, end)
+        self._lead_out(nodes, ways)
+        legs = [_leg(way.lane, way.passed(nodes)) for way in ways]
         return (*legs[:-1], replace(legs[-1], last=True)) if legs else ()
+
+    def _lead_over(self, nodes: Sequence[str], ways: list[_Way], end: int) -> None:
+        """Fly one of the ways on over this node, beyond what is counted, sooner than visit it afterwards: the
+        last way where that ends there, and so need not come back."""
+        ends = [index for way in ways for index in (way.start, way.target)]
+        if not ends or min(ends) <= end <= max(ends):
+            return
+        outermost = max(ends) if end > max(ends) else min(ends)
+        turning = [k for k, way in enumerate(ways) if way.target == outermost]
+        if not turning:
+            return
+        k = turning[-1] if turning[-1] == len(ways) - 1 else turning[0]
+        flown = ways[k : k + 2]
+        low, high = min(end, outermost), max(end, outermost)
+        if all(self._is_open(nodes, low, high, way.lane) for way in flown):
+            ways[k : k + 2] = [
+                replace(flown[0], target=end),
+                *(replace(way, start=end) for way in flown[1:]),
+            ]
+
+    def _lead_out(self, nodes: Sequence[str], ways: list[_Way]) -> None:
+        """Fly the last way on to the next node from which the aisle is left: any way on leads there, unless
+        something was left open."""
+        if not ways:
+            return
+        step = 1 if ways[-1].target > ways[-1].start else -1
+        ahead = range(ways[-1].target, len(nodes) if step > 0 else -1, step)
+        exits = (index for index in ahead if self._is_exit(nodes[index]))
+        target = next(exits, ways[-1].target)
+        if self._leads_on(nodes, ways, target):
+            ways[-1] = replace(ways[-1], target=target)
+
+    def _is_exit(self, node: str) -> bool:
+        nodes = self._site.nodes
+        return any(nodes[other].aisle != nodes[node].aisle for other in self._site.neighbours(node))
+
+    def _leads_on(self, nodes: Sequence[str], ways: Sequence[_Way], target: int) -> bool:
+        """Whether the last way may be flown on to there without stopping."""
+        if not ways or target == ways[-1].target:
+            return False
+        last = ways[-1]
+        low, high = min(last.target, target), max(last.target, target)
+        onwards = (target > last.target) == (last.target > last.start)
+        return onwards and self._is_open(nodes, low, high, last.lane)
 
     def seconds(self, legs: Sequence[SweepLeg], pace: Pace, yaw_rad: float) -> float:
         """How long the legs take, from the flying height and `yaw_rad` on."""

@@ -49,6 +49,7 @@ class SweepTask:
         self._findings: list[Finding] = []
         self._owners: dict[str, set[str]] = {}
         self._apart: set[tuple[str, str, str]] = set()
+        self._glimpsed: dict[str, int] = {}
         self._since_ns: int | None = None
         self.exposure = legs[0].exposure
         """What pictures are wanted with, as a part of the camera's usual exposure."""
@@ -118,8 +119,12 @@ class SweepTask:
             )
 
     def step(self, now_ns: int) -> None:
-        """Decide what has been flown past."""
-        self._pass([code for code, votes in self._votes.items() if 0 < votes.newest_ns < now_ns - _GONE_NS])
+        """Decide what has been flown past.  What was seen too little, such as on a turn before its leg, may
+        still be flown past."""
+        gone = {c: v.newest_ns for c, v in self._votes.items() if 0 < v.newest_ns < now_ns - _GONE_NS}
+        fresh = [code for code, newest_ns in gone.items() if self._glimpsed.get(code) != newest_ns]
+        self._pass(fresh, leave=Undecided.UNSEEN)
+        self._glimpsed = {code: newest_ns for code, newest_ns in gone.items() if code in self._votes}
 
     def flown(self, leg: SweepLeg) -> None:
         """The end of this leg is reached."""
@@ -147,11 +152,14 @@ class SweepTask:
             self._votes[code] = SweepVotes(code, self._node_of(code), self._params, share)
         return self._votes[code]
 
-    def _pass(self, codes: Iterable[str]) -> None:
-        """These are out of the picture: each is decided, or left for a stop."""
+    def _pass(self, codes: Iterable[str], leave: Undecided | None = None) -> None:
+        """These are out of the picture: each is decided, or left for a stop; nothing becomes of those that
+        would be left for the reason `leave`."""
         gone = [code for code in codes if code not in self._closed]
         verdicts = {code: self._verdict(code) for code in gone}
         for code, verdict in verdicts.items():
+            if leave is not None and verdict is leave:
+                continue
             self._closed.add(code)
             self._votes.pop(code, None)
             if isinstance(verdict, Finding):

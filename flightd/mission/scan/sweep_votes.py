@@ -9,13 +9,14 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 from flightd.config.scan import ScanConfig
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
-from flightd.mission.scan.location_votes import LocationVotes
+from flightd.mission.scan.location_votes import SEEN_EMPTY, LocationVotes
 
 _SEEN_SHARE = 0.6
 """Part of what can be seen of a place that a picture must show to say anything of it."""
@@ -53,6 +54,7 @@ class SweepVotes:
         self._fair_rad: list[float] = []
         self._whole_rad: list[float] = []
         self._unfair = self._occupied = self._empty = 0
+        self._whole_occupied = self._whole_empty = 0
         self._doubtful: set[str] = set()
         self.newest_ns = 0
         """When it was in a picture last; 0 before the first."""
@@ -80,6 +82,9 @@ class SweepVotes:
                 self._unfair += not fair
                 self._occupied += fair and place.occupancy in _OCCUPIED
                 self._empty += place.occupancy is Occupancy.EMPTY
+                if share >= _WHOLE_SHARE:
+                    self._whole_occupied += place.occupancy in _OCCUPIED
+                    self._whole_empty += place.occupancy is Occupancy.EMPTY
                 if fair:
                     self._fair_rad.append(bearing_rad)
                     self._whole_rad += [bearing_rad] * (share >= _WHOLE_SHARE)
@@ -101,7 +106,9 @@ class SweepVotes:
             return self._with_codes(found)
         if not self._doubtful <= set(others):
             return Undecided.NOBODYS
-        return self._unread(found) if found.state in _UNREAD else found
+        if found.state not in _UNREAD:
+            return found
+        return self._empty_after_all(found) or self._unread(found)
 
     def _with_codes(self, found: Finding) -> Finding | Undecided:
         """Codes count that several views give; several of them, where a view shows each two together."""
@@ -111,6 +118,13 @@ class SweepVotes:
         if any(pair not in self._together for pair in combinations(texts, 2)):
             return Undecided.APART
         return found
+
+    def _empty_after_all(self, found: Finding) -> Finding | None:
+        """An empty place beside goods: where the picture's edge cuts it off, they look like its own."""
+        enough = self._whole_empty >= self._params.sweep.unread_views and not self._whole_occupied
+        if not enough or self._votes.any_read:
+            return None
+        return replace(found, state=LocationState.EMPTY, confidence=SEEN_EMPTY)
 
     def _unread(self, found: Finding) -> Finding | Undecided:
         """Nothing is unreadable by few views, by bad light, or from one angle."""
@@ -124,9 +138,9 @@ class SweepVotes:
         if self._occupied and self._empty:
             return Undecided.UNSURE
         spread_rad = math.radians(sweep.unread_spread_deg)
-        if self._occupied < _LEAST_WHOLE:  # an empty place would have shown its deck to so many views
-            sure = len(self._whole_rad) >= sweep.unread_views and _spread(self._whole_rad) >= 2.0 * spread_rad
-            return found if sure else Undecided.UNSURE
+        if self._occupied < _LEAST_WHOLE:  # an empty place would have shown its deck to one of so many views
+            enough = len(self._whole_rad) >= sweep.unread_views and not self._empty
+            return found if enough and _spread(self._whole_rad) >= 2.0 * spread_rad else Undecided.UNSURE
         enough = len(self._whole_rad) >= _LEAST_WHOLE and _spread(self._fair_rad) >= spread_rad
         return found if enough else Undecided.UNSEEN
 

@@ -35,11 +35,15 @@ class Flight:
     """Feeds a mission with inputs: by default all is well and the drone is wherever the mission wants."""
 
     def __init__(
-        self, params: Config | None = None, site: Site = SITE, scanner: AnyScanner = NO_SCAN
+        self,
+        params: Config | None = None,
+        site: Site = SITE,
+        scanner: AnyScanner = NO_SCAN,
+        policy: HeadingPolicy = POLICY,
     ) -> None:
         home = site.home.node
-        plan = make_plan(site, site.serpentine_route(), home, home, POLICY)
-        self.mission = Mission(site, plan, POLICY, params or configured(dwell_s=1.0), scanner)
+        plan = make_plan(site, site.serpentine_route(), home, home, policy)
+        self.mission = Mission(site, plan, policy, params or configured(dwell_s=1.0), scanner)
         self.site = site
         self.integrity = 1.0
         self.heartbeat_s = 0.0

@@ -33,6 +33,40 @@ size_m = 0.5
 """,
     "shelves",
 )
+_SPACING = "[1.3, 1.3, 1.3, 1.3]"
+BARE_ENDS = parse_site(
+    """
+[site]
+name = "three aisles"
+ceiling_m = 6.0
+"""
+    + "".join(
+        f"""
+[[aisle]]
+id = "{aisle}"
+x_m = 0.0
+y_m = {y_m}
+spacing_m = {_SPACING}
+shelf_distance_m = 1.2
+shelf_height_m = 2.4
+"""
+        for aisle, y_m in (("A", 0.0), ("B", 3.4), ("C", 6.8))
+    )
+    + "".join(f'[[cross]]\nnodes = ["{a}{n}", "{b}{n}"]\n' for a, b in ("AB", "BC") for n in (1, 5))
+    + """
+[[rack]]
+bay_width_m = 1.3
+levels_m = [0.9, 1.8]
+positions = 2
+
+[[pad]]
+id = "home"
+node = "A1"
+size_m = 0.5
+""",
+    "three aisles",
+)
+"""The middle aisle has no shelves before its end nodes."""
 FITTED = {"url": "udp://127.0.0.1:0"}
 """A front camera, whose pictures reach the tests another way."""
 SIGHT = FrontSight(FrontCameraConfig().lens(), FrontCameraConfig().mount())

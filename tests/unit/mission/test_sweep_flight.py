@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -12,19 +13,23 @@ from flightd.app.build import scanner_of
 from flightd.config.battery import BatteryConfig
 from flightd.config.schema import Config
 from flightd.config.sweep import ScanMode
+from flightd.core.geometry import wrap_pi
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Settled
 from flightd.core.types import CommandKind, Event, LandedState, Phase
 from flightd.mission.plan.flight_plan import HeadingPolicy
+from flightd.mission.plan.leg_times import Pace, profile_s
+from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.scanner import Scanner
 from flightd.sim.plant.kinematics import Kinematics
+from flightd.site.site import Site
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
-from tests.unit.mission.shelves import FITTED, SIGHT, SITE
+from tests.unit.mission.shelves import BARE_ENDS, FITTED, SIGHT, SITE
+from tools.sweep_time import spent
 
 PLACES = tuple(SITE.locations)
-STOCK = {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in PLACES}
 PICTURE_NS = 240_000_000
 PASSING = {Phase.TURN, Phase.FOLLOW, Phase.HOVER}
 
@@ -39,16 +44,18 @@ def config() -> Config:
 
 
 class Sweep(Flight):
-    """The whole aisle of the small site, with an ideal front camera before a known stock."""
+    """All of a site, the small one unless told otherwise, with an ideal front camera before a known stock."""
 
-    def __init__(self, params: Config | None = None, stock: Stock | None = None) -> None:
+    def __init__(self, params: Config | None = None, stock: Stock | None = None, site: Site = SITE) -> None:
         params = params or config()
-        scanner = scanner_of(params, SITE)
+        scanner = scanner_of(params, site)
         assert isinstance(scanner, Scanner)
-        super().__init__(params, SITE, scanner)
-        assert HeadingPolicy.of(params) == HeadingPolicy.of(config())
+        super().__init__(params, site, scanner, HeadingPolicy.of(params))
         self.scanner = scanner
-        self.front = IdealFront(SITE, SIGHT, stock or Stock(STOCK))
+        self.front = IdealFront(site, SIGHT, stock or Stock(labels_of(site)))
+        self.legs: list[SweepLeg] = []
+        self.turned: list[tuple[str, float]] = []
+        """Each turn by more than a right angle: the goal that it is for, and by how much."""
         self.findings: list[Finding] = []
         self.settled: list[Settled] = []
         self.events: list[Event] = []
@@ -65,6 +72,7 @@ class Sweep(Flight):
         self.run(0.02, follow=False)
 
     def _tick(self) -> bool:
+        self._note_turn()
         self.phases.append(self.phase)
         if self.phase is Phase.SCAN:
             self.scanned.add(self.mission.goal.node)
@@ -107,6 +115,14 @@ class Sweep(Flight):
                 self.scanner.take(self.front.see(k, places, self.now_ns), here)
         return False
 
+    def _note_turn(self) -> None:
+        pose, goal = self.inputs.pose, self.mission.goal
+        if goal.sweep is not None and goal.sweep not in self.legs:
+            self.legs.append(goal.sweep)
+        if pose is not None and self.phase is Phase.TURN and self.phases[-1:] != [Phase.TURN]:
+            angle_rad = abs(wrap_pi(goal.yaw_rad - pose.yaw_rad))
+            self.turned += [(goal.node, angle_rad)] * (angle_rad > 1.6)
+
     @property
     def on_leg(self) -> bool:
         """Half-way along a leg past a shelf."""
@@ -119,6 +135,11 @@ class Sweep(Flight):
 
     def said(self, name: str) -> list[str]:
         return [event.text for event in self.events if event.name == name]
+
+
+def labels_of(site: Site) -> dict[str, list[Label]]:
+    """A code at each place."""
+    return {code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in site.locations}
 
 
 def lit(codes: CodeSet, places: set[str]) -> CodeSet:
@@ -159,6 +180,44 @@ def test_what_views_leave_open_is_visited_by_stopping_in_the_best_order() -> Non
     # it ends its legs over A1, where the pad is: there is no way but out and back
     assert "A2, A4 to stop at" in flight.said("sweep")
     assert flight.scanned == {"A2", "A4"}
+    # and that is where its time went
+    times = spent(flight.events)
+    began, *_, ended = (event.stamp_ns for event in flight.events if event.name == "phase")
+    assert sum(seconds for seconds, _ in times.values()) == pytest.approx((ended - began) * 1e-9, abs=1.0)
+    assert times["legs past shelves"][1] == 4
+    assert times["stops before what was left open"][1] >= 4
+    assert "nodes that are not flown past" not in times
+
+
+def test_aisle_after_aisle_is_flown_past_with_one_half_turn_each_and_no_way_out_to_bare_ends() -> None:
+    flight = Sweep(config().with_values(camera={"mount_yaw_deg": 90.0}), site=BARE_ENDS)
+    flight.fly(600.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert flight.states == dict.fromkeys(BARE_ENDS.locations, LocationState.READ)
+    assert set(flight.said("visited")) == set(BARE_ENDS.nodes)
+    assert len(flight.said("sweep")) == 3
+    assert not flight.scanned
+    assert [node[0] for node, _ in flight.turned] == ["A", "B", "C"], "from one side to the other"
+    assert len(flight.legs) == 12
+
+
+def test_between_two_legs_it_waits_for_nothing_but_height_and_heading() -> None:
+    """Where it comes to rest, and where it gathers speed, the places at the end are seen long enough."""
+    params = config()
+    flight = Sweep(params)
+    flight.fly()
+    pace = Pace.of(params.mission)
+    changes = [
+        (event.stamp_ns * 1e-9, event.text) for event in flight.events if event.name in {"phase", "swept"}
+    ]
+    begun = next(k for k, (_, text) in enumerate(changes) if "follow -> hover" in text)
+    over = next(k for k, (_, text) in enumerate(changes) if "to stop before" in text)
+    between = list(pairwise(changes[begun:over]))
+    turns_s = [end - start for (start, text), (end, _) in between if "-> turn" in text]
+    legs_s = [end - start for (start, text), (end, _) in between if "-> follow" in text]
+    assert len(turns_s) == len(legs_s) == 4
+    assert sorted(turns_s)[1] < pace.climb_s(0.9) - 0.2, "settled, from a decimetre before its height on"
+    assert sorted(legs_s)[1] < profile_s(3.9, pace.speed_mps, pace.accel_mps2) + 0.6
 
 
 @pytest.mark.parametrize("kind", [CommandKind.PAUSE, CommandKind.HOME, CommandKind.LAND])
@@ -190,8 +249,8 @@ def test_an_order_on_a_leg_acts_as_anywhere_else(kind: CommandKind) -> None:
 
 def test_a_battery_that_runs_low_on_the_way_leaves_the_rest_for_the_next() -> None:
     flight = Sweep(config().with_values(battery=BatteryConfig(swap=True)))
-    flight.fly(until=lambda: flight.on_leg and len(flight.findings) > 3)
-    flight.set(battery_frac=0.15)
+    flight.fly(until=lambda: flight.on_leg and len(flight.findings) > 6)
+    flight.set(battery_frac=0.19)
     flight.fly()
     flight.down()
     assert flight.phase is Phase.SWAP, flight.mission.reason

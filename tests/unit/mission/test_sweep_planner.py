@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -21,7 +22,7 @@ from flightd.mission.scan.views import ViewPlanner
 from flightd.site.site import Side, Site
 from flightd.site.site_file import parse_site
 from tests.unit.mission.configured import configured
-from tests.unit.mission.shelves import SIGHT, SITE
+from tests.unit.mission.shelves import BARE_ENDS, SIGHT, SITE
 
 NODES = ("A1", "A2", "A3", "A4")
 ALL = frozenset(SITE.locations)
@@ -75,6 +76,57 @@ def test_it_flies_up_one_side_and_down_the_other_from_end_to_end() -> None:
     ]
     pace = Pace.of(CONFIG.mission)
     assert 4 * 3.9 / 0.8 < PLANNER.seconds(legs, pace, -math.pi / 2) < 60.0
+
+
+BARE = replace(
+    SITE, locations={code: place for code, place in SITE.locations.items() if place.node in {"A2", "A3"}}
+)
+"""Nothing hangs before the end nodes."""
+
+
+@pytest.mark.parametrize("here", ["A1", "A4"])
+def test_a_leg_leads_on_over_an_end_node_without_shelves(here: str) -> None:
+    far = "A4" if here == "A1" else "A1"
+    legs = sweeps(BARE).legs(NODES, frozenset(BARE.locations), here, -math.pi / 2, 0.9)
+    assert [far in leg.nodes for leg in legs] == [True, True, False, False]
+    assert legs[0].nodes[0] == here
+    assert all(a.end == b.nodes[0] for a, b in pairwise(legs))
+    inner = NODES[:3] if here == "A1" else NODES[1:]
+    legs = sweeps(BARE).legs(inner, frozenset(BARE.locations), here, -math.pi / 2, 0.9)
+    assert not any(far in leg.nodes for leg in legs), "it is not to be visited"
+
+
+def test_the_last_leg_does_it_where_it_need_not_come_back() -> None:
+    one = replace(
+        BARE, locations={c: p for c, p in BARE.locations.items() if (p.side, p.level) == ("left", 1)}
+    )
+    legs = sweeps(one).legs(NODES, frozenset(one.locations), "A1", -math.pi / 2, 0.9)
+    assert [leg.nodes for leg in legs] == [NODES]
+    three = replace(
+        BARE, locations={c: p for c, p in BARE.locations.items() if (p.side, p.level) != ("right", 2)}
+    )
+    legs = sweeps(three).legs(NODES, frozenset(three.locations), "A1", -math.pi / 2, 0.9)
+    assert ["A4" in leg.nodes for leg in legs] == [False, False, True]
+
+
+def test_legs_end_where_the_next_begins_and_where_the_aisle_is_left() -> None:
+    planner, everything = sweeps(BARE_ENDS), frozenset(BARE_ENDS.locations)
+    legs = planner.legs(("B1", "B2", "B3", "B4", "B5"), everything, "B1", math.pi / 2, 0.9)
+    assert [(leg.nodes[0], leg.end) for leg in legs] == [
+        ("B1", "B5"),
+        ("B5", "B2"),
+        ("B2", "B4"),
+        ("B4", "B1"),  # nothing hangs before B1, but there the way to another aisle begins
+    ]
+    # one front is longer than the other: on to its end, not back to that first
+    legs = planner.legs(("C1", "C2", "C3", "C4", "C5"), everything, "C1", -math.pi / 2, 0.9)
+    assert [leg.side for leg in legs] == [Side.LEFT, Side.LEFT, Side.RIGHT, Side.RIGHT]
+    assert [(leg.nodes[0], leg.end) for leg in legs] == [
+        ("C1", "C4"),
+        ("C4", "C1"),
+        ("C1", "C5"),
+        ("C5", "C1"),
+    ]
 
 
 def test_levels_whose_places_fit_one_picture_are_flown_past_together() -> None:

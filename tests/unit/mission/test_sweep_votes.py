@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -51,6 +52,8 @@ def state(found: Finding | Undecided) -> LocationState | Undecided:
     return found.state if isinstance(found, Finding) else found
 
 
+UNSURE_READ = read("109481000094", sure=False)
+NOTHING_AT_ALL: Sequence[Sequence[PlacedRead]] = ((),) * 8
 NOTHING: Sequence[Sequence[PlacedRead]] = ((),) * 6
 
 
@@ -80,6 +83,34 @@ def test_one_label_read_differently_decides_nothing() -> None:
     assert verdict([one, one, two, two, (), ()]) is Undecided.TORN
 
 
+def test_half_a_code_at_the_pictures_edge_does_not_make_another_of_its_label() -> None:
+    """Cut off, an EAN-13 is read as a UPC-E whose check digit nothing vouches for."""
+    whole = [placed("4094819312344")]
+    half = [replace(placed("109481000094", sure=False), read=replace(UNSURE_READ, agreeing=2))]
+    found = verdict([whole, whole, whole, half])
+    assert isinstance(found, Finding)
+    assert [read.text for read in found.reads] == ["4094819312344"]
+    assert verdict([whole, whole, half]) is Undecided.TORN, "too few to overrule it"
+    assert verdict([whole, whole, whole, half, half]) is Undecided.TORN, "more than a slip"
+    beside = [replace(half[0], x_m=1.2)]
+    assert state(verdict([whole, whole, whole, beside])) is Undecided.APART
+    assert verdict([whole, whole, whole, [placed("P2")]]) is Undecided.TORN, "vouched for, too"
+
+
+def test_a_neighbours_goods_in_a_cut_off_view_leave_an_empty_place_empty() -> None:
+    def seen(*views: tuple[float, Occupancy]) -> LocationState | Undecided:
+        votes = SweepVotes(CODE, "A2", PARAMS, 1.0)
+        for seq, (share, occupancy) in enumerate(views):
+            look = PlaceLook(CODE, QUAD, share, occupancy, f"picture {seq}")
+            votes.add(seq, pose(seq * 250_000_000), look, (), bearing_rad=math.radians(8.0 * seq))
+        return state(votes.verdict())
+
+    empty, unsure = (0.95, EMPTY), (1.0, UNSURE)
+    assert seen((0.7, GOODS), empty, unsure, empty, empty, empty) is LocationState.EMPTY
+    assert seen((0.7, GOODS), empty, unsure, empty, empty) is Undecided.UNSURE
+    assert seen((0.95, GOODS), empty, unsure, empty, empty, empty) is Undecided.UNSURE
+
+
 def test_empty_takes_as_many_views_as_at_a_stop() -> None:
     assert state(verdict(NOTHING, [UNSURE, EMPTY, EMPTY, EMPTY, UNSURE])) is LocationState.EMPTY
     assert not isinstance(verdict(NOTHING, [EMPTY, EMPTY]), Finding)
@@ -95,6 +126,14 @@ def test_unreadable_takes_goods_enough_views_angles_and_light() -> None:
     assert verdict(NOTHING, light=Light.BURNT) is Undecided.LIGHT
     assert verdict(NOTHING, (UNSURE,) * 6, step_deg=3.0) is Undecided.UNSURE
     assert state(verdict(NOTHING, (UNSURE,) * 6)) is LocationState.UNREADABLE
+
+
+def test_what_looked_empty_to_some_views_is_not_said_to_be_unreadable() -> None:
+    unsure = (UNSURE,) * 8
+    assert state(verdict(NOTHING_AT_ALL, unsure)) is LocationState.UNREADABLE
+    for empty in (1, 2):
+        seen = (*unsure[empty:], *(EMPTY,) * empty)
+        assert state(verdict(NOTHING_AT_ALL, seen)) is Undecided.UNSURE
 
 
 def test_a_code_that_may_be_a_neighbours_leaves_no_place_without_a_code() -> None:
@@ -176,6 +215,21 @@ def test_a_place_is_decided_once_it_has_been_flown_past() -> None:
     assert not passing.task.drain(), "it is still in the picture"
     assert passing.found() == {ONE: LocationState.READ, TWO: LocationState.READ}
     assert ONE not in passing.task.near(pose(passing.now_ns, height_m=0.9))
+
+
+def test_a_place_that_was_only_glimpsed_may_still_be_flown_past() -> None:
+    """On a turn before its leg, or while the drone gathers speed."""
+    flight = Passing()
+    flight.see({ONE: ["P1"]})
+    assert flight.found() == {}
+    for _ in range(4):
+        flight.see({ONE: ["P1"]})
+    assert flight.found() == {ONE: LocationState.READ}
+    assert ONE not in flight.task.undecided
+    flight.see({TWO: ["P2"]})
+    assert flight.found() == {}
+    flight.task.end()
+    assert flight.task.undecided[TWO] is Undecided.UNSEEN
 
 
 def test_one_code_at_two_neighbours_is_decided_at_neither() -> None:

@@ -1,0 +1,22 @@
+"""What is left of a count in passing whose process is killed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_killed_at_random_moments_of_a_sweep_nothing_booked_is_lost_or_counted_twice(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "tests.unit.mission.kill_a_sweep", "8", "3", str(tmp_path / "store")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=250)
+    result = json.loads(done.stdout)
+    assert result["kills"] == 8
+    assert {key: result[key] for key in ("lost", "double", "again", "unsound")} == dict.fromkeys(
+        ("lost", "double", "again", "unsound"), 0
+    )
+    assert result["completed"] > 0, "what was killed is gone on with to its end"
+    assert result["writes"] > 50
