@@ -57,8 +57,8 @@ def rolled(point_m: tuple[float, float], pose: Kinematics, mount: Mount) -> tupl
 def line_through(a: tuple[float, float], b: tuple[float, float]) -> Line:
     turned = math.atan2(a[0] - b[0], b[1] - a[1])
     rho, theta = normalise_line(a[0] * math.cos(turned) + a[1] * math.sin(turned), turned)
-    ends = sorted(y * math.cos(theta) - x * math.sin(theta) for x, y in (a, b))
-    return Line(rho, theta, 20.0, *ends, 1.0, 0.1, 0.001)
+    start, end = sorted(y * math.cos(theta) - x * math.sin(theta) for x, y in (a, b))
+    return Line(rho, theta, 20.0, start, end, 1.0, 0.1, 0.001)
 
 
 @pytest.mark.parametrize("name", MOTIONS)
