@@ -29,13 +29,15 @@ class LabelTruth:
 
 @dataclass(frozen=True, slots=True)
 class LocationTruth:
-    """One location: the state that a perfect count gives it, and its labels."""
+    """One location: the state that a perfect count gives it, its labels, and `fill`, the part of its
+    opening that goods stand in as seen straight from before it, 0..1."""
 
     code: str
     node: str
     state: LocationState
     situation: str
     labels: tuple[LabelTruth, ...]
+    fill: float = 0.0
 
     @property
     def texts(self) -> frozenset[str]:
@@ -76,7 +78,8 @@ class StockScore:
 
 def stock_truth(site: Site, look: RackAppearance, focal_px: float, seed: int) -> dict[str, LocationTruth]:
     """The truth of every location of the site, by its code; `seed` is the flight's."""
-    places = stock(site, look.shares, focal_px, seed if look.seed is None else look.seed)
+    stock_seed = seed if look.seed is None else look.seed
+    places = stock(site, look.shares, focal_px, stock_seed, look.in_part)
     return {code: _truth(place) for code, place in places.items()}
 
 
@@ -91,7 +94,10 @@ def _truth(place: StockPlace) -> LocationTruth:
         for label in place.labels
     )
     location = place.opening.location
-    return LocationTruth(location.code, location.node, place.situation.state, place.situation.value, labels)
+    situation = place.situation
+    return LocationTruth(
+        location.code, location.node, situation.state, situation.value, labels, round(place.fill, 3)
+    )
 
 
 def score_stock(
@@ -147,6 +153,7 @@ def _row(place: LocationTruth) -> dict[str, Any]:
         "node": place.node,
         "state": place.state.value,
         "situation": place.situation,
+        "fill": place.fill,
         "labels": [
             {"symbology": label.symbology, "text": label.text, "condition": label.condition}
             for label in place.labels
