@@ -123,8 +123,8 @@ def table(told: Sequence[Told]) -> list[str]:
         f"share told {len(known)}, within 10 points {right} ({100 * right / max(len(known), 1):.1f} %)",
         f"unknown, of those in the light: {unknown} ({100 * unknown / max(len(plain), 1):.1f} %)",
         f"filled though the state is empty {len(filled)}, empty though it is not {len(emptied)}",
-        f"overhang told {len(out)} of {len(standing)}, off by {_cm(outs[len(outs) // 2 :])} in the middle, by "
-        f"{_cm(outs[-1:])} at most",
+        f"overhang told {len(out)} of {len(standing)}, off by {_cm(outs[len(outs) // 2 :])} in the middle, "
+        f"by {_cm(outs[-1:])} at most",
     ]
     for error, one in off[:5]:
         lines.append(f"off by {error:.2f}: {one.code}, seed {one.seed}, {_words(one)}")
