@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, TypeAlias
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,8 +39,17 @@ _LIT: Final = 0.22
 _TOP_STEP: Final = 0.05
 _TOP_PART: Final = 0.85
 """Part of white by which a front's upper edge is a step, and the most that its top has of its brightness."""
-_HOLLOW_PART: Final = 0.12
-"""The part of the opening of which it is not known whether it is empty may be no greater."""
+_UNLIT_PART: Final = 0.12
+_BLANK_PART: Final = 0.05
+"""Parts of the opening, without a lit deck and blank in the dark, up to which it is as empty as it seems."""
+_DARK: Final = 0.28
+"""Part of white below which goods are as dark as the rack."""
+_BACK_ROWS: Final = 17
+_LEAST_SHOWN: Final = 0.0055
+"""Rows over which what is even is taken out of the dark, and the structure, as a part of white, that is left
+of what is seen there: mesh, the backs of other goods."""
+_SEAM_M: Final = 0.03
+"""So near to a front's end nothing is looked for in the dark above it."""
 _LOOKED_M: Final = 0.3
 """So deep an empty deck has to be lit."""
 
@@ -63,7 +73,8 @@ def measure(raster: Image, opening: PlaceOpening, white: float, codes_m: Sequenc
     tops_m = fronts_m(above, opening, left)
     if any(_is_lost(code, whole[deck:], tops_m, left) for code in codes_m):
         return PlaceFill(None)
-    if _unlit_part(whole[deck:, columns], tops_m, opening) > _HOLLOW_PART:
+    room = whole[deck:, columns]
+    if _unlit_part(room, tops_m, opening) > _UNLIT_PART or _blank_part(room, tops_m, opening) > _BLANK_PART:
         return PlaceFill(None)
     depths = FrontDepths(raster[:, columns], whole[:, columns], opening, tops_m < LOW_M)
     _, eye_m, before_m = opening.eye_m
@@ -132,3 +143,17 @@ def _unlit_part(level: Floats, tops_m: Floats, opening: PlaceOpening) -> float:
         lit = np.median(level[clear:strip], axis=0) > _LIT
     unlit = (tops_m < LOW_M) & ~lit
     return float(unlit.mean())
+
+
+def _blank_part(level: Floats, tops_m: Floats, opening: PlaceOpening) -> float:
+    """The part of the opening that is dark above fronts and shows nothing of the back: goods as dark as that
+    may stand there."""
+    _, eye_m, before_m = opening.eye_m
+    far = before_m / (before_m + SIDE_DEPTH_M)
+    top_m = eye_m + (opening.height_m - eye_m) * far  # above is the roof, which shows nothing
+    rows = np.arange(len(level))[:, None] * ROW_M
+    shows = np.abs(level - cv2.blur(level, (1, _BACK_ROWS)))
+    behind = (rows > tops_m + _SEAM_M) & (rows < top_m) & (tops_m >= LOW_M)
+    dark = behind & (level < _DARK)
+    blank = cv2.blur(np.where(dark, shows, 1.0).astype(np.float32), (3, 2 * _BACK_ROWS)) < _LEAST_SHOWN
+    return float((blank & dark).sum()) * ROW_M / (opening.height_m * len(tops_m))

@@ -40,6 +40,8 @@ _SAME_M: Final = 0.04
 """Heights that differ by less are the same."""
 _OPEN_PART: Final = 0.5
 """Part of a dim front's columns in which nothing but a front can be, for it to count as one."""
+_OPEN_MORE: Final = 0.15
+"""And of those in which it would be higher than what is known."""
 _DECK_DEPTH_M: Final = 0.5
 """So deep the deck may be lit."""
 _FINE_ROWS: Final = 17
@@ -73,9 +75,12 @@ def fronts_m(level: Floats, opening: PlaceOpening, left: int) -> Floats:
             shaded = beside[start:stop] | (sides[start:stop] >= top)
             if shaded.mean() > 1.0 - _OPEN_PART:
                 continue
-            known = int(np.median(fronts[start:stop]))
-            if known < top and _structured(fine[:, start:stop], known, top) > known:
-                fronts[start:stop] = np.maximum(fronts[start:stop], top)
+            more = start + np.flatnonzero(fronts[start:stop] < top)
+            if not more.size or shaded[more - start].mean() > 1.0 - _OPEN_MORE:
+                continue
+            known = int(np.median(fronts[more]))
+            if _structured(fine[:, more], known, top) > known:
+                fronts[more] = top
     return np.where(fronts > 0, fronts * np.float32(ROW_M) + np.float32(CLEAR_M), np.float32(0.0)).astype(
         np.float32
     )

@@ -85,8 +85,7 @@ def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> 
     """What one place shows, and its picture."""
     height, width = bgr.shape[:2]
     occupancy = Occupancy.UNSURE
-    own = [read for read in reads if _contains(place, read)]
-    if own:
+    if any(_contains(place, read) for read in reads):
         occupancy = Occupancy.GOODS
     elif _is_inside(place.core_px, width, height):
         x0, y0, x1, y1 = _box(place.core_px, width, height)
@@ -96,7 +95,7 @@ def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> 
     jpeg = evidence_jpeg(np.ascontiguousarray(bgr[y0:y1, x0:x1])) if x1 > x0 and y1 > y0 else b""
     name = picture_name(jpeg) if jpeg else ""
     light = light_on(bgr[y0:y1, x0:x1], white)
-    fill = _fill(bgr, place, own, white, occupancy)
+    fill = _fill(bgr, place, reads, white, occupancy)
     return PlaceLook(place.location, place.quad_px, place.share, occupancy, name, light, fill), jpeg
 
 
@@ -113,7 +112,8 @@ def _fill(
     for read in reads:
         corners_m = onto_opening(np.array(read.corners_px), opening)
         (x0, low), (x1, high) = corners_m.min(axis=0), corners_m.max(axis=0)
-        codes.append((float(x0), float(low), float(x1), float(high)))
+        if x0 >= 0.0 and x1 <= opening.width_m and low >= 0.0 and high <= opening.height_m:
+            codes.append((float(x0), float(low), float(x1), float(high)))
     return fill_level(bgr, opening, white, codes) or PlaceFill(None)
 
 
