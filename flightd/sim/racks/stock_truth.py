@@ -16,6 +16,8 @@ from flightd.site.site import Site
 _UNKNOWN = {LocationState.UNREADABLE, LocationState.OCCLUDED}
 """Something is there, and nobody can say what; which of the two it is, is not held against a count."""
 
+_SAME_FILL = 0.1
+
 
 @dataclass(frozen=True, slots=True)
 class LabelTruth:
@@ -58,7 +60,8 @@ class StockScore:
     all texts told of a location where no such label hangs (a wrong text, or the right one at a wrong
     place).  `empty_*`: places without goods, those said to be so, and others said to be so.
     `unreadable_*`: places whose labels cannot be read (torn, too small, missing, covered), and those told
-    as unreadable or occluded.  `locations_right` have exactly the state of a perfect count."""
+    as unreadable or occluded.  `locations_right` have exactly the state of a perfect count.  `fill_told`:
+    places of which it was told how full they are, `fill_right` of these within 10 points of the truth."""
 
     locations_planned: int
     locations_visited: int
@@ -71,6 +74,8 @@ class StockScore:
     empty_wrong: int
     unreadable_expected: int
     unreadable_told: int
+    fill_told: int
+    fill_right: int
 
     def as_summary(self) -> dict[str, int]:
         return {field.name: getattr(self, field.name) for field in fields(self)}
@@ -125,6 +130,12 @@ def score_stock(
     ]
     empty = [place for place in asked if place.situation == StockSituation.EMPTY]
     unknown = [place for place in asked if place.state in _UNKNOWN]
+    fills = [
+        (record.observation.fill.share, place.fill)
+        for place in asked
+        if (record := found.get(place.code)) and record.observation and record.observation.fill
+    ]
+    shares = [(share, true) for share, true in fills if share is not None]
     said_empty = [code for code, state in told.items() if state is LocationState.EMPTY]
     return StockScore(
         locations_planned=len(asked),
@@ -138,6 +149,8 @@ def score_stock(
         empty_wrong=sum(truth[code].state is not LocationState.EMPTY for code in said_empty),
         unreadable_expected=len(unknown),
         unreadable_told=sum(told[place.code] in _UNKNOWN for place in unknown),
+        fill_told=len(shares),
+        fill_right=sum(abs(share - true) <= _SAME_FILL for share, true in shares),
     )
 
 
