@@ -76,7 +76,8 @@ def fronts_m(level: Floats, opening: PlaceOpening, left: int) -> Floats:
             if shaded.mean() > 1.0 - _OPEN_PART:
                 continue
             more = start + np.flatnonzero(fronts[start:stop] < top)
-            if not more.size or shaded[more - start].mean() > 1.0 - _OPEN_MORE:
+            alike = (fronts[start:stop] < top) | (np.abs(fronts[start:stop] - top) * ROW_M <= _SAME_M)
+            if not more.size or shaded[alike].mean() > 1.0 - _OPEN_MORE:
                 continue
             known = int(np.median(fronts[more]))
             if _structured(fine[:, more], known, top) > known:
