@@ -12,11 +12,11 @@ from typing import Final
 from flightd.core.inventory import LocationState, PlaceFill
 
 _SAME: Final = 0.1
-_LEAST_AGREEING: Final = 0.6
+_LEAST_AGREEING: Final = 0.7
 """Part of the pictures whose shares must be so near to that in the middle."""
-_LEAST_KNOWN: Final = 0.7
+_LEAST_KNOWN: Final = 0.6
 """Part of the pictures that must tell a share."""
-_NOTHING: Final = 0.02
+_NOTHING: Final = 0.03
 """A share that goods, however few, do not stay below."""
 
 

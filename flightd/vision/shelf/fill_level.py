@@ -38,7 +38,11 @@ _LIT: Final = 0.22
 """Part of white that an empty deck has at least."""
 _TOP_STEP: Final = 0.05
 _TOP_PART: Final = 0.85
-"""Part of white by which a front's upper edge is a step, and the most that its top has of its brightness."""
+_TOP_HUE: Final = 0.05
+"""Part of white by which a front's upper edge is a step; the most that its top has of its brightness, or the
+least by which a part of its colour differs."""
+_DOUBT_PART: Final = 0.07
+"""The part of the opening of which it is not known whether it is front or top may be no greater."""
 _UNLIT_PART: Final = 0.12
 _BLANK_PART: Final = 0.05
 """Parts of the opening, without a lit deck and blank in the dark, up to which it is as empty as it seems."""
@@ -78,12 +82,14 @@ def measure(raster: Image, opening: PlaceOpening, white: float, codes_m: Sequenc
         return PlaceFill(None)
     depths = FrontDepths(raster[:, columns], whole[:, columns], opening, tops_m < LOW_M)
     _, eye_m, before_m = opening.eye_m
-    area, out_m = 0.0, 0.0
+    colours = np.maximum(raster[deck + round(CLEAR_M / ROW_M) :, columns], 1).astype(np.float32) / white
+    area, doubt, out_m = 0.0, 0.0, 0.0
     runs = equal_runs(tops_m)
     for number, (start, stop) in enumerate(runs):
         if tops_m[start] < LOW_M:
             continue
-        top_m = _without_top(above[:, start:stop], float(tops_m[start]), opening) - depths.edge_m
+        top_m, perhaps_m = _without_top(colours[:, start:stop], float(tops_m[start]), opening)
+        top_m -= depths.edge_m
         width = stop - start + left / 2 * (number == 0) + right / 2 * (number == len(runs) - 1)
         depth_m = depths.of(start, stop)
         depth_m = 0.0 if depth_m is None else depth_m
@@ -91,29 +97,37 @@ def measure(raster: Image, opening: PlaceOpening, white: float, codes_m: Sequenc
         scale = (before_m + depth_m) / before_m
         high_m = min(eye_m + (top_m - eye_m) * scale, opening.height_m)
         area += width * COLUMN_M * scale * max(high_m, 0.0)
-    share = min(area / (opening.width_m * opening.height_m), 1.0)
+        doubt += width * COLUMN_M * perhaps_m
+    whole_m2 = opening.width_m * opening.height_m
+    if doubt > _DOUBT_PART * whole_m2:
+        return PlaceFill(None)
+    share = min(area / whole_m2, 1.0)
     return PlaceFill(round(share, 3), round(out_m, 3) or None)
 
 
-def _without_top(level: Floats, top_m: float, opening: PlaceOpening) -> float:
-    """Where a front ends that seems to end at `top_m`: what is above it, less bright and no higher than a top
-    face is seen, is the top of the goods."""
+def _without_top(colours: Floats, top_m: float, opening: PlaceOpening) -> tuple[float, float]:
+    """Where a front, (rows, columns, 3) as parts of white, ends that seems to end at `top_m`, and how much of
+    it may be its top for all that.  What is above an edge, less bright or of another colour, and no higher
+    than a top face is seen, is the top of the goods."""
     _, eye_m, before_m = opening.eye_m
     far = before_m / (before_m + SIDE_DEPTH_M)
     rows = round((top_m - CLEAR_M) / ROW_M)
     if top_m - LOW_M >= eye_m or rows < 8:
-        return top_m
-    profile = np.median(level[:rows], axis=1)
+        return top_m, 0.0
+    profile = np.median(colours[:rows], axis=1)
     splits = np.arange(4, rows - 3)
     split_m = CLEAR_M + splits * ROW_M
-    step = profile[splits - 2] - profile[splits + 1]
+    step = np.abs(profile[splits - 2] - profile[splits + 1]).max(axis=1)
     reach_m = split_m + (eye_m - split_m) * (1.0 - far)
     fits = (step > _TOP_STEP) & (split_m < eye_m) & (reach_m >= top_m - CLEAR_M)
-    for number in sorted(np.flatnonzero(fits).tolist(), key=lambda number: -float(step[number])):
+    edges = sorted(np.flatnonzero(fits).tolist(), key=lambda number: -float(step[number]))
+    for number in edges:
         split = int(splits[number])
-        if float(np.median(profile[split:])) < _TOP_PART * float(np.median(profile[:split])):
-            return float(split_m[number])
-    return top_m
+        front, top = (np.median(part, axis=0) for part in (profile[:split], profile[split:]))
+        other = np.abs(front / front.sum() - top / top.sum()).max() > _TOP_HUE
+        if other or float(top.max()) < _TOP_PART * float(front.max()):
+            return float(split_m[number]), 0.0
+    return top_m, top_m - float(split_m[edges[0]]) if edges else 0.0
 
 
 def _is_lost(code: Box, level: Floats, tops_m: Floats, left: int) -> bool:
