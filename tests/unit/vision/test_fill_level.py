@@ -18,6 +18,7 @@ EYE_M = (0.2, 0.28, 1.2)
 FOCAL_PX, SIZE_PX = 900.0, (1280, 800)
 WHITE, BEAM, DECK = 226, (28, 84, 205), (70, 84, 92)
 FRONT, SIDE, BACK, DARK = (92, 138, 178), (40, 62, 84), (44, 46, 48), (12, 12, 13)
+TOP = (64, 96, 122)
 Colour = tuple[int, int, int]
 Box = tuple[float, float, float, float]
 """Left and right end from the opening's middle, height, and depth behind the rack's face; metres."""
@@ -63,6 +64,10 @@ class Shelf:
         back = max(depth, 0.0) + 0.4
         for x in (left, right):
             self.area([(x, 0, depth), (x, 0, back), (x, high, back), (x, high, depth)], SIDE)
+        if high < EYE_M[1]:
+            self.area(
+                [(left, high, depth), (right, high, depth), (right, high, back), (left, high, back)], TOP
+            )
         front = [(left, 0, depth), (right, 0, depth), (right, high, depth), (left, high, depth)]
         self.area(front, colour, grained=True)
 
@@ -101,6 +106,11 @@ def share_of(*boxes: Box) -> float:
 def test_the_share_is_that_of_the_fronts_and_not_of_sides_and_tops(boxes: tuple[Box, ...]) -> None:
     share, _ = told(*boxes)
     assert share == pytest.approx(share_of(*boxes), abs=0.05)
+
+
+def test_the_top_of_low_goods_counts_for_nothing() -> None:
+    low = (-0.3, 0.3, 0.1, 0.0)
+    assert told(low)[0] == pytest.approx(share_of(low), abs=0.03)
 
 
 def test_goods_that_stand_deep_in_the_rack_are_told_in_their_true_size() -> None:
