@@ -28,6 +28,8 @@ _BURNT: Final = 250.0
 """White that is so light may be lighter than the picture can say."""
 _POST_M: Final = 0.05
 """So far an upright may reach into the opening."""
+_LEAST_COLUMNS: Final = 4
+"""An opening of which uprights may hide all but that is too narrow."""
 _AROUND_M: Final = (0.035, 0.08)
 """Around a code its label ends at the first, and the goods go on to the second."""
 _LEAST_TONE: Final = 0.30
@@ -70,6 +72,8 @@ def fill_level(
 def measure(raster: Image, opening: PlaceOpening, white: float, codes_m: Sequence[Box] = ()) -> PlaceFill:
     """The same from the opening's raster."""
     left, right = (round(_POST_M / COLUMN_M) if post else 0 for post in opening.posts)
+    if raster.shape[1] - left - right < _LEAST_COLUMNS:
+        return PlaceFill(None)
     columns = slice(left, raster.shape[1] - right)
     whole = raster.max(axis=2).astype(np.float32) / np.float32(white)
     deck = round(BELOW_M / ROW_M)

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from flightd.core.scanning import PlaceOpening
@@ -144,3 +146,27 @@ def test_a_code_above_all_that_was_found_makes_the_share_unknown() -> None:
 @pytest.mark.parametrize("white", [255.0, float("nan")])
 def test_nothing_is_told_where_white_is_not_known(white: float) -> None:
     assert told((-0.3, 0.3, 0.5, 0.0), white=white) == (None, None)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.tuples(st.floats(0.005, 5.0), st.floats(0.1, 5.0)),
+    st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.5), st.floats(0.05, 3.0)),
+    st.tuples(st.booleans(), st.booleans()),
+    st.tuples(st.floats(5.0, 150.0), st.floats(5.0, 110.0)),
+    st.integers(0, 9),
+)
+@example((0.08, 0.6), (0.0, 0.3, 1.2), (True, True), (40.0, 90.0), 1)
+def test_an_opening_of_any_size_and_from_anywhere_tells_a_share_or_nothing(
+    size_m: tuple[float, float],
+    eye_m: tuple[float, float, float],
+    posts: tuple[bool, bool],
+    half_px: tuple[float, float],
+    seed: int,
+) -> None:
+    coarse = np.random.default_rng(seed).integers(0, 256, (24, 32, 3), np.uint8)
+    picture: Image = np.ascontiguousarray(coarse.repeat(10, axis=0).repeat(10, axis=1))
+    x, y = half_px
+    front = ((-x, -y), (x, -y), (x, y), (-x, y))
+    fill = fill_level(picture, PlaceOpening(front, *size_m, eye_m, posts), 200.0, [(0.1, 0.1, 0.2, 0.2)])
+    assert fill is None or fill.share is None or 0.0 <= fill.share <= 1.0
