@@ -61,12 +61,29 @@ class CountPose:
 
 
 @dataclass(frozen=True, slots=True)
+class PlaceFill:
+    """How full a place is: the `share` of its opening, 0..1 as seen straight from before it, in which goods
+    stand; None where the pictures do not tell.  `overhang_m` is how far goods are seen to stand out over the
+    rack's face, None where none are."""
+
+    share: float | None
+    overhang_m: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.share is not None and not 0.0 <= self.share <= 1.0:
+            raise ValueError(f"a share of {self.share} outside 0..1")
+        if self.overhang_m is not None and not 0.0 < self.overhang_m < math.inf:
+            raise ValueError(f"an overhang of {self.overhang_m} m")
+
+
+@dataclass(frozen=True, slots=True)
 class Observation:
     """One look at one location: its state, what was read, from where, and how sure (0..1).
 
     `evidence` is the SHA-256 of the picture, in hexadecimal, or empty.  Where in the picture a code was is no
     part of the record: reads that come from a store have no `corners_px` and no `gs1_problem`.  `texts` are
-    values of printed text in the picture: they may be looked for later, and do not change the `id`.
+    values of printed text in the picture: they may be looked for later, and do not change the `id`, nor does
+    `fill`, which is None where it was not asked.
     """
 
     run: str
@@ -78,6 +95,7 @@ class Observation:
     pose: CountPose | None = None
     evidence: str = ""
     texts: tuple[LabelValue, ...] = ()
+    fill: PlaceFill | None = None
 
     def __post_init__(self) -> None:
         texts = {read.text for read in self.reads}

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from flightd.core.inventory import LocationState
+from flightd.core.inventory import LocationState, PlaceFill
 from flightd.core.types import CodeRead
 
 Quad: TypeAlias = tuple[tuple[float, float], ...]
@@ -40,21 +40,37 @@ class Light(enum.StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class PlaceOpening:
+    """The room of a place as a picture shows it: `front_px` the corners of its front, from the beam above
+    down to the deck, `width_m` by `height_m` large.  `eye_m` is the camera, to the right of the front's lower
+    middle, above it and before it; `posts` says whether an upright stands at its left and at its right."""
+
+    front_px: Quad
+    width_m: float
+    height_m: float
+    eye_m: tuple[float, float, float]
+    posts: tuple[bool, bool]
+
+
+@dataclass(frozen=True, slots=True)
 class Place:
     """A location as the picture is expected to show it: its cell and how much of that is inside; the core of
     the cell, which goods cover if there are any; and the front part of the deck below the core, which an
-    empty place shows (its far end above its near one; empty where it cannot be in the picture)."""
+    empty place shows (its far end above its near one; empty where it cannot be in the picture).  `opening` is
+    None where it is not in the picture."""
 
     location: str
     quad_px: Quad
     share: float
     core_px: Quad
     deck_px: Quad = ()
+    opening: PlaceOpening | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceLook:
-    """What one picture shows of one location; `evidence` names the picture of it (SHA-256) or is empty."""
+    """What one picture shows of one location; `evidence` names the picture of it (SHA-256) or is empty.
+    `fill` is None where it shows too little of the opening."""
 
     location: str
     quad_px: Quad
@@ -62,6 +78,7 @@ class PlaceLook:
     occupancy: Occupancy
     evidence: str = ""
     light: Light = Light.FAIR
+    fill: PlaceFill | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +132,7 @@ class Finding:
     y_m: float
     height_m: float
     yaw_rad: float
+    fill: PlaceFill | None = None
 
     def __post_init__(self) -> None:
         if not all(map(math.isfinite, (self.x_m, self.y_m, self.height_m, self.yaw_rad))):

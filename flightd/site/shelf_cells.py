@@ -21,13 +21,17 @@ _LEAST_SPACING_M = 0.4
 say it."""
 _DECK_SEEN_M = 0.3
 """How deep the deck of an empty place is looked at."""
+_BEAM_M, _MOST_BEAM = 0.10, 0.5
+"""Height of the beam below a deck, and the most of the way from deck to deck that it takes."""
 _NEXT_M = 0.5
 """Height above the topmost labels that still belongs to their level where the shelf does not end before."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The upright rectangle of one location on the shelf front, metres on the map and above the floor."""
+    """The upright rectangle of one location on the shelf front, metres on the map and above the floor.
+
+    Goods have room from `deck_m` to `top_m`; `posts` says at which of `x0_m` and `x1_m` an upright stands."""
 
     location: str
     aisle: str
@@ -40,6 +44,13 @@ class Cell:
     label_m: float
     spacing_m: float
     deck_m: float
+    top_m: float
+    posts: tuple[bool, bool]
+
+    @property
+    def opening_m(self) -> tuple[tuple[float, float, float], ...]:
+        """(x, y, height) of the room for goods at the front, corners in the order of `core_m`."""
+        return self._corners(self.x0_m, self.x1_m, self.deck_m, self.top_m)
 
     @property
     def deck_corners_m(self) -> tuple[tuple[float, float, float], ...]:
@@ -97,6 +108,7 @@ def cells_of(site: Site) -> dict[str, Cell]:
         half_m = rack.bay_width_m / rack.positions / 2
         levels = rack.levels_m
         decks = decks_m(rack, tops[location.aisle, location.side])
+        rooms = _rooms_m(rack, decks, tops[location.aisle, location.side])
         i = location.level - 1
         low = 0.0 if i == 0 else (levels[i - 1] + levels[i]) / 2
         top = tops[location.aisle, location.side]
@@ -113,8 +125,18 @@ def cells_of(site: Site) -> dict[str, Cell]:
             location.height_m,
             _spacing_m(levels),
             decks[i],
+            rooms[i],
+            (location.position == 1, location.position == rack.positions),
         )
     return cells
+
+
+def _rooms_m(rack: Rack, decks: Sequence[float], height_m: float) -> tuple[float, ...]:
+    """The height up to which goods may stand in each level: to the beam of the next, or to the rack's top."""
+    beams = [min(_BEAM_M, _MOST_BEAM * (above - below)) for below, above in itertools.pairwise(decks)]
+    rooms = [above - beam for above, beam in zip(decks[1:], beams, strict=True)]
+    last_m = decks[-1] + deck_spacing_m(rack.levels_m, height_m) - _BEAM_M
+    return (*rooms, max(min(last_m, height_m), rack.levels_m[-1]))
 
 
 def decks_m(rack: Rack, height_m: float) -> tuple[float, ...]:

@@ -26,6 +26,7 @@ from flightd.adapters.store.label_texts import (
     merge_texts,
     was_searched,
 )
+from flightd.adapters.store.place_fills import FILL_TABLES, keep_fill, kept_fills
 from flightd.adapters.store.read_only import connect_read_only
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
@@ -33,20 +34,24 @@ from flightd.core.inventory import (
     LocationRecord,
     LocationState,
     Observation,
+    PlaceFill,
     PlannedLocation,
     Standing,
 )
 from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
-_VERSION = 3
-_READABLE = 2
-"""The format before it is read as it is: nothing but module sizes and printed text is missing."""
+_VERSION = 4
+_WITH_TEXTS = 3
+"""The first format with module sizes and printed text."""
+_READABLE = (2, 3, _VERSION)
+"""Formats that are read as they are: nothing but that and how full places are is missing."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
 _TAKEN_OVER = {
     1: ("ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1",),
     2: ("ALTER TABLE code_read ADD COLUMN module_px REAL", *TEXT_TABLES),
+    3: FILL_TABLES,
 }
 """What makes a file of each earlier format one of the next."""
 _SCHEMA = """
@@ -78,7 +83,7 @@ CREATE TABLE code_read (
     module_px REAL,
     PRIMARY KEY (observation, number)
 ) STRICT, WITHOUT ROWID;
-""" + "".join(f"{table};\n" for table in TEXT_TABLES)
+""" + "".join(f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES))
 
 
 class SqliteStore:
@@ -125,7 +130,7 @@ class SqliteStore:
             if application != _APPLICATION:
                 raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
             self._version = version
-            if version not in {_READABLE, _VERSION}:
+            if version not in _READABLE:
                 older = version in _TAKEN_OVER
                 remedy = f"flightd inventory show {self.folder}" if older else "the flightd that wrote it"
                 problem = f"format {version}, known here is {_VERSION}"
@@ -297,12 +302,15 @@ class SqliteStore:
                 for i, r in enumerate(seen.reads)
             ],
         )
+        if seen.fill is not None:
+            keep_fill(self._db, seen.id, seen.fill)
 
     def forget(self, looks: Iterable[str]) -> None:
         """Take looks out, by their ids: somebody else keeps them."""
         rows = [(look,) for look in looks]
         with self._transaction():
             self._db.executemany("DELETE FROM code_read WHERE observation = ?", rows)
+            self._db.executemany("DELETE FROM place_fill WHERE observation = ?", rows)
             self._db.executemany("DELETE FROM observation WHERE id = ?", rows)
 
     def locations(self) -> list[LocationRecord]:
@@ -327,7 +335,7 @@ class SqliteStore:
     def _observations(self, location: str | None = None) -> list[tuple[Observation, int]]:
         """All looks, or those at one location, with their standing, oldest first."""
         reads: dict[str, list[CodeRead]] = {}
-        module = "module_px" if self._version == _VERSION else "NULL"
+        module = "module_px" if self._version >= _WITH_TEXTS else "NULL"
         for seen, symbology, text, sure, agreeing, quality, gs1, module_px in self._db.execute(
             f"SELECT observation, symbology, text, sure, agreeing, quality, gs1, {module} FROM code_read "  # noqa: S608
             "ORDER BY observation, number"
@@ -336,7 +344,8 @@ class SqliteStore:
                 symbology, text, (), bool(sure), agreeing, quality, _elements(gs1), module_px=module_px
             )
             reads.setdefault(seen, []).append(read)
-        texts = kept_texts(self._db) if self._version == _VERSION else {}
+        texts = kept_texts(self._db) if self._version >= _WITH_TEXTS else {}
+        fills = kept_fills(self._db) if self._version == _VERSION else {}
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
             "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "
@@ -344,7 +353,12 @@ class SqliteStore:
             (location,),
         )
         return [
-            (_observation(row[:-1], tuple(reads.get(row[0], ())), texts.get(row[0], ())), row[-1])
+            (
+                _observation(
+                    row[:-1], tuple(reads.get(row[0], ())), texts.get(row[0], ()), fills.get(row[0])
+                ),
+                row[-1],
+            )
             for row in rows
         ]
 
@@ -353,7 +367,7 @@ class SqliteStore:
         with other._reading():
             planned = [PlannedLocation(record.code, record.node) for record in other.locations()]
             seen = other._observations()
-            searched = all_searches(other._db) if other._version == _VERSION else []
+            searched = all_searches(other._db) if other._version >= _WITH_TEXTS else []
         for observation, _ in seen:
             if observation.evidence and other.evidence.path(observation.evidence).exists():
                 self.evidence.keep(other.evidence.path(observation.evidence).read_bytes())
@@ -379,9 +393,12 @@ def _elements(gs1: str) -> tuple[tuple[str, str], ...]:
 
 
 def _observation(
-    row: tuple[Any, ...], reads: tuple[CodeRead, ...], texts: tuple[LabelValue, ...]
+    row: tuple[Any, ...],
+    reads: tuple[CodeRead, ...],
+    texts: tuple[LabelValue, ...],
+    fill: PlaceFill | None,
 ) -> Observation:
     _, run, location, utc_ns, state, confidence, evidence, node, *place = row
     pose = None if node is None else CountPose(node, *place)
     seen = LocationState(state)
-    return Observation(run, location, utc_ns, seen, confidence, reads, pose, evidence, texts)
+    return Observation(run, location, utc_ns, seen, confidence, reads, pose, evidence, texts, fill)

@@ -33,6 +33,7 @@ def observation_json(seen: Observation, least_confidence: float = LEAST_CONFIDEN
         "state": seen.state.value,
         "confidence": seen.confidence,
         "evidence": seen.evidence,
+        "fill": seen.fill and {"share": seen.fill.share, "overhang_m": seen.fill.overhang_m},
         "pose": pose
         and {
             "node": pose.node,

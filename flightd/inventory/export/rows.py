@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from flightd.core.inventory import LocationRecord
+from flightd.core.inventory import LocationRecord, Observation
 from flightd.core.label_values import LEAST_CONFIDENCE
 from flightd.core.types import CodeRead
 from flightd.core.utc_time import utc_text
-from flightd.inventory.export.value_columns import VALUE_COLUMNS, value_cells
+from flightd.inventory.export.value_columns import UNKNOWN, VALUE_COLUMNS, value_cells
 from flightd.inventory.place_values import code_values, place_values
 
 COLUMNS: Final = (
     "location", "state", "text", "symbology", "gs1", "confidence", "utc", "run", "node", "x_m", "y_m",
-    "height_m", "evidence", *VALUE_COLUMNS,
+    "height_m", "evidence", *VALUE_COLUMNS, "fill", "overhang_m",
 )  # fmt: skip
 
 
@@ -42,7 +42,15 @@ def rows_of(
                     seen.confidence if seen else "", utc_text(seen.utc_ns) if seen else "",
                     seen.run if seen else "", record.node, pose.x_m if pose else "",
                     pose.y_m if pose else "", pose.height_m if pose else "", seen.evidence if seen else "",
-                    *value_cells(values),
+                    *value_cells(values), *_fill_cells(seen),
                 ]
             )  # fmt: skip
     return rows
+
+
+def _fill_cells(seen: Observation | None) -> list[str | float]:
+    """How full the place is, 0 to 1, and the overhang; empty where it was not asked."""
+    if seen is None or seen.fill is None:
+        return ["", ""]
+    share, overhang_m = seen.fill.share, seen.fill.overhang_m
+    return [UNKNOWN if share is None else share, "" if overhang_m is None else overhang_m]

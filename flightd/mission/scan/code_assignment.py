@@ -15,7 +15,7 @@ import numpy as np
 
 from flightd.core.camera_view import CameraView, ForwardMount, Viewpoint
 from flightd.core.geometry import Lens, Matrix
-from flightd.core.scanning import BodyPose, CodeSet, Place, Quad
+from flightd.core.scanning import BodyPose, CodeSet, Place, PlaceOpening, Quad
 from flightd.core.types import CodeRead
 from flightd.site.racks import code_form
 from flightd.site.shelf_cells import Cell, cells_of
@@ -26,6 +26,8 @@ _DEPTH_SIGMA_M = 0.05
 _TILT_SIGMA_RAD = math.radians(0.5)
 _HEIGHT_SIGMA_M = 0.03
 _LEAST_SHARE = 0.02
+_OPENING_SHARE, _LEAST_ROOM_M = 0.85, 0.1
+"""How full a place is, is asked where so much of its opening is in the picture, and if it is no lower."""
 _BAY_SHARE = 0.75
 """Part of a bay's width by which a location label must be off its place to contradict the map."""
 
@@ -118,7 +120,7 @@ class Assigner:
             if share >= _LEAST_SHARE:
                 quad, core = _quad(pixels[:4], lens), _quad(pixels[4:8], lens)
                 deck = _quad(pixels[8:], lens) if np.isfinite(pixels[8:]).all() else ()
-                found.append(Place(code, quad, round(share, 3), core, deck))
+                found.append(Place(code, quad, round(share, 3), core, deck, _opening(cell, view)))
         return tuple(found)
 
     def look(self, codes: CodeSet, pose: BodyPose, front: tuple[str, Side]) -> ShelfLook:
@@ -198,6 +200,23 @@ def _sigmas(pose: BodyPose, x_m: float, height_m: float, distance_m: float) -> t
 def _quad(pixels: Matrix, lens: Lens) -> Quad:
     centre_x, centre_y = lens.centre_px
     return tuple((round(float(x) - centre_x, 1), round(float(y) - centre_y, 1)) for x, y in pixels)
+
+
+def _opening(cell: Cell, view: CameraView) -> PlaceOpening | None:
+    """The room of a cell in the picture, None where too little of it is."""
+    corners = np.array(cell.opening_m)
+    width_m, height_m = cell.x1_m - cell.x0_m, cell.top_m - cell.deck_m
+    pixels = view.project(corners)
+    if height_m < _LEAST_ROOM_M or not np.isfinite(pixels).all():
+        return None
+    if _inside_share(pixels, view.lens) < _OPENING_SHARE:
+        return None
+    at = view.viewpoint
+    rightwards = 1.0 if cell.side is Side.LEFT else -1.0
+    right_m = rightwards * (at.x_m - (cell.x0_m + cell.x1_m) / 2)
+    eye_m = right_m, at.height_m - cell.deck_m, abs(at.y_m - cell.y_m)
+    posts = cell.posts if rightwards > 0.0 else cell.posts[::-1]
+    return PlaceOpening(_quad(pixels, view.lens), width_m, height_m, eye_m, posts)
 
 
 def _inside_share(pixels: Matrix, lens: Lens) -> float:

@@ -10,6 +10,7 @@ from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
 from flightd.mission.scan.code_votes import CodeVotes
+from flightd.mission.scan.fill_votes import FillVotes
 
 _LEAST_SHARE = 0.6
 """Part of a cell that must be in the picture for the picture to count as a look at it."""
@@ -36,6 +37,7 @@ class LocationVotes:
         self._node = node
         self._least = pictures
         self._votes = CodeVotes()
+        self._fills = FillVotes()
         self._seen: Counter[Occupancy] = Counter()
         self._empty_in_a_row = self._most_empty = 0
         self._quiet = 0
@@ -72,6 +74,7 @@ class LocationVotes:
             self._seen[occupancy] += 1
             self._empty_in_a_row = self._empty_in_a_row + 1 if occupancy is Occupancy.EMPTY else 0
             self._most_empty = max(self._most_empty, self._empty_in_a_row)
+        self._fills.add(place.fill if place is not None else None)
         if place is not None or reads:
             self._quiet = 0 if new else self._quiet + 1
             self._pose = pose
@@ -142,6 +145,7 @@ class LocationVotes:
             y_m=pose.y_m,
             height_m=pose.height_m,
             yaw_rad=pose.yaw_rad,
+            fill=self._fills.together(state),
         )
 
     def _believed(self) -> tuple[tuple[PlacedRead, ...], bool]:

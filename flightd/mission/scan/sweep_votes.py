@@ -73,9 +73,7 @@ class SweepVotes:
         shelf; `doubtful` are codes in it that may belong here or to a neighbour."""
         if place is not None:
             share = min(place.share / self._full_share, 1.0)
-            place = PlaceLook(
-                place.location, place.quad_px, share, place.occupancy, place.evidence, place.light
-            )
+            place = replace(place, share=share)
             if share >= _SEEN_SHARE:
                 self.newest_ns = max(self.newest_ns, pose.stamp_ns)
                 fair = place.light is Light.FAIR or place.occupancy is Occupancy.EMPTY

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from flightd.core.inventory import LocationRecord, LocationState
 from flightd.replay.report.markup import element, text
-from flightd.replay.report.stock import CountedStock, share
+from flightd.replay.report.stock import CountedStock, fill_text, share
 from flightd.site.site import Location, Side, Site
 
 _HALF_COLUMNS = 30
@@ -118,6 +118,8 @@ def cell(record: LocationRecord, outcome: str) -> str:
     parts = [record.code, STATE_NAMES[record.state], *record.texts]
     if seen is not None:
         parts.append(share(seen.confidence))
+        if seen.fill is not None and seen.fill.share is not None:
+            parts.append(f"{fill_text(seen.fill)} filled")
     if outcome:
         parts.append(outcome.replace("_", " "))
     return element(

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from flightd.core.inventory import LocationRecord, LocationState, Observation
+from flightd.core.inventory import LocationRecord, LocationState, Observation, PlaceFill
 from flightd.inventory.comparison import ComparisonOutcome, Difference
 from flightd.replay.report.figures import Figure
 from flightd.replay.report.markup import number
@@ -100,6 +100,16 @@ def percent(part: int, whole: int) -> str:
 def share(value: float) -> str:
     """A confidence, 0 to 1, in per cent, never rounded up."""
     return f"{number(math.floor(value * 1000 + _ROUNDING) / 10, 1)} %"
+
+
+def fill_text(fill: PlaceFill | None) -> str:
+    """How full a place is, for people; an empty text where it was not asked."""
+    if fill is None:
+        return ""
+    if fill.share is None:
+        return "unknown"
+    out = f", {100.0 * fill.overhang_m:.0f} cm over the rack's face" if fill.overhang_m else ""
+    return f"{100.0 * fill.share:.0f} %{out}"
 
 
 _ROUNDING = 1e-9

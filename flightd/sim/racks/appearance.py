@@ -9,8 +9,9 @@ from flightd.sim.racks.stock import StockShares
 
 @dataclass(frozen=True, slots=True)
 class RackAppearance:
-    """`shares` of the places; `seed` of the goods, the flight's own when None; `location_labels` hangs a
-    small label with each location's code on the beam below it.  `noise` is the standard deviation in grey
+    """`shares` of the places; `in_part` of those with goods are filled only in part, in stacks; `seed` of the
+    goods, the flight's own when None; `location_labels` hangs a small label with each location's code on the
+    beam below it.  `noise` is the standard deviation in grey
     levels at mid grey, `soft_px` the sigma of the lens blur, `exposure` scales the brightness, `flicker`
     is the share of it that beats with the mains."""
 
@@ -22,4 +23,5 @@ class RackAppearance:
     vignetting: float = 0.2
     exposure: float = 1.0
     flicker: float = 0.01
+    in_part: float = 0.0
     motion_blur: bool = True

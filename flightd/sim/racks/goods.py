@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from flightd.core.types import Image
 from flightd.sim.racks.label_paper import stick
 from flightd.sim.racks.panels import texels_per_m, texture_shape
-from flightd.sim.racks.stock import Goods, StockPlace
+from flightd.sim.racks.stacks import Goods
+from flightd.sim.racks.stock import StockPlace
 
 _PALLET_M = 0.10
 _GRAIN_PX = 1024
@@ -37,10 +38,9 @@ class GoodsPainter:
         # twice as large, so that a crop of one period is one piece wherever it begins
         self._grain: Image = np.repeat(np.tile(gain, (2, 2))[..., None], 3, axis=2)
 
-    def front(self, place: StockPlace) -> Image:
-        """(H, W, 3) BGR front of a place that is not empty, the top row highest, as seen from the aisle."""
-        goods = place.goods
-        assert goods is not None
+    def front(self, place: StockPlace, goods: Goods) -> Image:
+        """(H, W, 3) BGR front of one of a place's stacks, the top row highest, as seen from the aisle; labels
+        hang on the first."""
         rng = np.random.default_rng([goods.looks, 0x676F6F64])
         density = texels_per_m(goods.width_m, goods.height_m)
         height, width = texture_shape(goods.width_m, goods.height_m, density)
@@ -53,7 +53,7 @@ class GoodsPainter:
             _pallet(front[height - pallet :], density, rng)
         self._grained(front, rng)
         _shade(front, density)
-        for label in place.labels:
+        for label in place.labels if goods is place.goods else ():
             x_px = (label.right_m - goods.right_m + goods.width_m / 2) * density - 0.5
             y_px = height - (label.height_m - place.opening.level.deck_m) * density - 0.5
             stick(front, label, x_px, y_px, density, goods.looks)

@@ -27,20 +27,21 @@ _HALF_SCALE = 0.4
 @dataclass(frozen=True, slots=True)
 class Panel:
     """A picture in the plane y = `y_m`: its left edge (as it is seen) at `left_m`, its right edge at
-    `right_m`, from `low_m` to `high_m` above the floor."""
+    `right_m`, from `low_m` to `high_m` above the floor; its upper edge is `lean_m` farther in x."""
 
     y_m: float
     left_m: float
     right_m: float
     low_m: float
     high_m: float
+    lean_m: float = 0.0
 
     def corners(self) -> Matrix:
         """(4, 3) map points: top left, top right, bottom right, bottom left."""
         return np.array(
             [
-                (self.left_m, self.y_m, self.high_m),
-                (self.right_m, self.y_m, self.high_m),
+                (self.left_m + self.lean_m, self.y_m, self.high_m),
+                (self.right_m + self.lean_m, self.y_m, self.high_m),
                 (self.right_m, self.y_m, self.low_m),
                 (self.left_m, self.y_m, self.low_m),
             ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,8 +16,9 @@ from flightd.core.types import Image
 from flightd.sim.racks.goods import GoodsPainter
 from flightd.sim.racks.panels import Pane, Panel, Texture
 from flightd.sim.racks.rack_layout import BEAM_M, DEPTH_M, UPRIGHT_M, Face, Opening, RackLevel
+from flightd.sim.racks.stacks import Goods
 from flightd.sim.racks.steel import BLUE, ORANGE, back, beam, upright
-from flightd.sim.racks.stock import Goods, StockPlace
+from flightd.sim.racks.stock import StockPlace
 
 _REACH_M = 7.0
 """Along the aisle, what is farther is not drawn."""
@@ -27,11 +28,14 @@ _KEPT, _KEPT_BYTES = 96, 500_000_000
 _BACKS = 8
 _LEAST_SLOPE = 0.15
 """Across the aisle per unit of ray: below this a picture looks along the face."""
+_SET_BACK_M = 0.05
+"""Fronts that stand deeper than this may be hidden by those beside them."""
 _SHEET_BEFORE_M = 0.03
 _SHEET_LOW_M = 0.06
 """A sheet ends this far above the deck: the label of the location stays to be seen."""
 _BACK_TONE = (24.0, 28.0, 31.0)
 _DECK_TONE, _DECK_FAR_TONE, _ROOF_TONE = (70.0, 84.0, 92.0), (24.0, 28.0, 31.0), (14.0, 16.0, 18.0)
+_TOP_TONES = ((58.0, 90.0, 120.0), (64.0, 96.0, 122.0), (50.0, 76.0, 100.0))
 _SIDE_TONES = ((40.0, 62.0, 84.0), (46.0, 68.0, 88.0), (36.0, 54.0, 72.0))
 
 
@@ -117,6 +121,9 @@ class Racks:
                 for place in places:
                     if place.goods is not None and place.opening.level == level:
                         _draw_sides(pane, sight, place, place.goods)
+                for place in places:
+                    if place.goods is not None and place.opening.level == level:
+                        _draw_tops(pane, sight, place, place.goods)
                 if level in above:
                     for x0_m, x1_m in sight.bays():
                         pane.polygon(
@@ -131,15 +138,30 @@ class Racks:
                 for opening in sight.openings()
                 if (place := self._places[opening.location.code]).goods is not None
             ]
-            for place, goods in stocked:
-                if goods is not None:
-                    make = partial(self._painter.front, place)
-                    panel = _goods_panel(sight.face, place, goods)
-                    pane.panel(panel, partial(self._picture, place.code, make), self._painter.tone(goods))
+            fronts = [
+                (place, stack, number)
+                for place, goods in stocked
+                if goods is not None
+                for number, stack in enumerate(goods.stacks)
+            ]
+            fronts.sort(key=lambda front: min(_SET_BACK_M - front[1].recess_m, 0.0))
+            for place, stack, number in fronts:
+                if stack.recess_m >= 0.0:
+                    self._draw_front(pane, sight, place, stack, number)
             self._draw_steel(pane, sight)
+            for place, stack, number in fronts:
+                if stack.recess_m < 0.0:
+                    _draw_side(pane, sight, place, replace(stack, depth_m=-stack.recess_m))
+                    self._draw_front(pane, sight, place, stack, number)
             for place, goods in stocked:
                 if goods is not None and goods.covered:
                     self._draw_sheet(pane, sight.face, place, goods)
+
+    def _draw_front(self, pane: Pane, sight: Sightline, place: StockPlace, stack: Goods, number: int) -> None:
+        make = partial(self._painter.front, place, stack)
+        panel = _goods_panel(sight.face, place, stack)
+        key: Hashable = (place.code, number) if number else place.code
+        pane.panel(panel, partial(self._picture, key, make), self._painter.tone(stack))
 
     def _draw_hollow(self, pane: Pane, sight: Sightline, x0_m: float, x1_m: float, level: RackLevel) -> None:
         face = sight.face
@@ -212,7 +234,8 @@ def _goods_panel(face: Face, place: StockPlace, goods: Goods) -> Panel:
     x_m = place.opening.x_m + face.right * goods.right_m
     half_m, deck_m = goods.width_m / 2, place.opening.level.deck_m
     y_m = face.y_m + face.inward * goods.recess_m
-    return _panel(face, y_m, x_m - half_m, x_m + half_m, deck_m, deck_m + goods.height_m)
+    panel = _panel(face, y_m, x_m - half_m, x_m + half_m, deck_m, deck_m + goods.height_m)
+    return replace(panel, lean_m=face.right * goods.lean_m) if goods.lean_m else panel
 
 
 def _flat(x0_m: float, x1_m: float, y0_m: float, y1_m: float, height_m: float) -> Matrix:
@@ -223,16 +246,35 @@ def _flat(x0_m: float, x1_m: float, y0_m: float, y1_m: float, height_m: float) -
 
 
 def _draw_sides(pane: Pane, sight: Sightline, place: StockPlace, goods: Goods) -> None:
-    """The side of the goods that is turned to the camera."""
+    """The sides of the goods that are turned to the camera, the nearest last."""
+    at_m, right = sight.at.x_m - place.opening.x_m, sight.face.right
+    for stack in sorted(goods.stacks, key=lambda stack: -abs(right * stack.right_m - at_m)):
+        _draw_side(pane, sight, place, stack)
+
+
+def _draw_tops(pane: Pane, sight: Sightline, place: StockPlace, goods: Goods) -> None:
+    """The tops of stacks that are seen from above."""
+    for stack in goods.stacks:
+        panel = _goods_panel(sight.face, place, stack)
+        if stack.depth_m is not None and sight.at.height_m > panel.high_m:
+            deep_m = panel.y_m + sight.face.inward * stack.depth_m
+            left_m, right_m = panel.left_m + panel.lean_m, panel.right_m + panel.lean_m
+            corners = _flat(left_m, right_m, panel.y_m, deep_m, panel.high_m)
+            pane.polygon(corners, _TOP_TONES[stack.looks % len(_TOP_TONES)])
+
+
+def _draw_side(pane: Pane, sight: Sightline, place: StockPlace, goods: Goods) -> None:
+    """The side of one stack that is turned to the camera."""
     panel = _goods_panel(sight.face, place, goods)
     x0_m, x1_m = sorted((panel.left_m, panel.right_m))
     if x0_m <= sight.at.x_m <= x1_m:
         return
     x_m = x0_m if sight.at.x_m < x0_m else x1_m
-    deep_m = sight.depth_m(0.9)[1]
+    whole_m, depth_m = sight.depth_m(0.9)[1], goods.depth_m
+    deep_m = whole_m if depth_m is None else panel.y_m + sight.face.inward * depth_m
     corners = [
-        (x_m, panel.y_m, panel.high_m),
-        (x_m, deep_m, panel.high_m),
+        (x_m + panel.lean_m, panel.y_m, panel.high_m),
+        (x_m + panel.lean_m, deep_m, panel.high_m),
         (x_m, deep_m, panel.low_m),
         (x_m, panel.y_m, panel.low_m),
     ]

@@ -26,6 +26,7 @@ from flightd.sim.racks.label_texts import (
     sscc,
 )
 from flightd.sim.racks.rack_layout import Opening, openings
+from flightd.sim.racks.stacks import Goods, in_stacks
 from flightd.site.site import Site
 
 _LINEAR_PX = (2.75, 3.3)
@@ -172,21 +173,6 @@ class Label:
 
 
 @dataclass(frozen=True, slots=True)
-class Goods:
-    """What stands in a place: a front of this size whose middle is `right_m` of the opening's, `recess_m`
-    behind the rack's face.  `covered` hangs a sheet before it, `dark` is dark and matte all over; `looks`
-    seeds everything else."""
-
-    width_m: float
-    height_m: float
-    right_m: float
-    recess_m: float
-    covered: bool
-    looks: int
-    dark: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class StockPlace:
     """One location with what is there; `goods` None is an empty place."""
 
@@ -200,13 +186,21 @@ class StockPlace:
         return self.opening.location.code
 
     @property
+    def fill(self) -> float:
+        """The part of the opening's front, 0..1, that goods stand in."""
+        return self.goods.share_of(self.opening) if self.goods is not None else 0.0
+
+    @property
     def readable(self) -> tuple[str, ...]:
         """The texts that a perfect count reads here."""
         return tuple(label.symbol.text for label in self.labels if label.condition.is_readable)
 
 
-def stock(site: Site, shares: StockShares, focal_px: float, seed: int) -> Mapping[str, StockPlace]:
-    """What is at every location of the site, by its code, in the order of the map."""
+def stock(
+    site: Site, shares: StockShares, focal_px: float, seed: int, in_part: float = 0.0
+) -> Mapping[str, StockPlace]:
+    """What is at every location of the site, by its code, in the order of the map; `in_part` is the part of
+    the places with goods that they fill only in part."""
     found = {}
     order = {code: number for number, code in enumerate(site.locations)}
     numbers = Numbers(seed)
@@ -215,12 +209,17 @@ def stock(site: Site, shares: StockShares, focal_px: float, seed: int) -> Mappin
         distance_m = max(abs(location.y_m - site.nodes[location.node].y_m), 0.1)
         rng = np.random.default_rng([seed, zlib.crc32(location.code.encode()), 0x73746F63])
         serial = numbers.of(order[location.code])
-        found[location.code] = _place(opening, shares, focal_px / distance_m, serial, rng)
+        found[location.code] = _place(opening, shares, focal_px / distance_m, serial, rng, in_part)
     return {code: found[code] for code in site.locations}
 
 
 def _place(
-    opening: Opening, shares: StockShares, px_per_m: float, serial: tuple[int, int], rng: np.random.Generator
+    opening: Opening,
+    shares: StockShares,
+    px_per_m: float,
+    serial: tuple[int, int],
+    rng: np.random.Generator,
+    in_part: float,
 ) -> StockPlace:
     situation = shares.situation(float(rng.random()))
     if situation is StockSituation.EMPTY:
@@ -233,6 +232,9 @@ def _place(
     looks = int(rng.integers(2**31))
     covered, dark = situation is StockSituation.OCCLUDED, situation is StockSituation.DARK or _is_dark(looks)
     goods = Goods(width_m, height_m, right_m, recess_m, covered, looks, dark)
+    fills = np.random.default_rng([looks, 0x66696C6C])  # of its own: the rest of the place stays as it is
+    if fills.random() < in_part:
+        goods = in_stacks(goods, opening, fills)
     if situation in _UNLABELLED:
         return StockPlace(opening, situation, goods, ())
     condition = _CONDITIONS.get(situation, Condition.CLEAN)

@@ -16,6 +16,8 @@ from flightd.site.site import Site
 _UNKNOWN = {LocationState.UNREADABLE, LocationState.OCCLUDED}
 """Something is there, and nobody can say what; which of the two it is, is not held against a count."""
 
+_SAME_FILL = 0.1
+
 
 @dataclass(frozen=True, slots=True)
 class LabelTruth:
@@ -29,13 +31,15 @@ class LabelTruth:
 
 @dataclass(frozen=True, slots=True)
 class LocationTruth:
-    """One location: the state that a perfect count gives it, and its labels."""
+    """One location: the state that a perfect count gives it, its labels, and `fill`, the part of its
+    opening that goods stand in as seen straight from before it, 0..1."""
 
     code: str
     node: str
     state: LocationState
     situation: str
     labels: tuple[LabelTruth, ...]
+    fill: float = 0.0
 
     @property
     def texts(self) -> frozenset[str]:
@@ -56,7 +60,8 @@ class StockScore:
     all texts told of a location where no such label hangs (a wrong text, or the right one at a wrong
     place).  `empty_*`: places without goods, those said to be so, and others said to be so.
     `unreadable_*`: places whose labels cannot be read (torn, too small, missing, covered), and those told
-    as unreadable or occluded.  `locations_right` have exactly the state of a perfect count."""
+    as unreadable or occluded.  `locations_right` have exactly the state of a perfect count.  `fill_told`:
+    places of which it was told how full they are, `fill_right` of these within 10 points of the truth."""
 
     locations_planned: int
     locations_visited: int
@@ -69,6 +74,8 @@ class StockScore:
     empty_wrong: int
     unreadable_expected: int
     unreadable_told: int
+    fill_told: int
+    fill_right: int
 
     def as_summary(self) -> dict[str, int]:
         return {field.name: getattr(self, field.name) for field in fields(self)}
@@ -76,7 +83,8 @@ class StockScore:
 
 def stock_truth(site: Site, look: RackAppearance, focal_px: float, seed: int) -> dict[str, LocationTruth]:
     """The truth of every location of the site, by its code; `seed` is the flight's."""
-    places = stock(site, look.shares, focal_px, seed if look.seed is None else look.seed)
+    stock_seed = seed if look.seed is None else look.seed
+    places = stock(site, look.shares, focal_px, stock_seed, look.in_part)
     return {code: _truth(place) for code, place in places.items()}
 
 
@@ -91,7 +99,10 @@ def _truth(place: StockPlace) -> LocationTruth:
         for label in place.labels
     )
     location = place.opening.location
-    return LocationTruth(location.code, location.node, place.situation.state, place.situation.value, labels)
+    situation = place.situation
+    return LocationTruth(
+        location.code, location.node, situation.state, situation.value, labels, round(place.fill, 3)
+    )
 
 
 def score_stock(
@@ -119,6 +130,12 @@ def score_stock(
     ]
     empty = [place for place in asked if place.situation == StockSituation.EMPTY]
     unknown = [place for place in asked if place.state in _UNKNOWN]
+    fills = [
+        (record.observation.fill.share, place.fill)
+        for place in asked
+        if (record := found.get(place.code)) and record.observation and record.observation.fill
+    ]
+    shares = [(share, true) for share, true in fills if share is not None]
     said_empty = [code for code, state in told.items() if state is LocationState.EMPTY]
     return StockScore(
         locations_planned=len(asked),
@@ -132,6 +149,8 @@ def score_stock(
         empty_wrong=sum(truth[code].state is not LocationState.EMPTY for code in said_empty),
         unreadable_expected=len(unknown),
         unreadable_told=sum(told[place.code] in _UNKNOWN for place in unknown),
+        fill_told=len(shares),
+        fill_right=sum(abs(share - true) <= _SAME_FILL for share, true in shares),
     )
 
 
@@ -147,6 +166,7 @@ def _row(place: LocationTruth) -> dict[str, Any]:
         "node": place.node,
         "state": place.state.value,
         "situation": place.situation,
+        "fill": place.fill,
         "labels": [
             {"symbology": label.symbology, "text": label.text, "condition": label.condition}
             for label in place.labels

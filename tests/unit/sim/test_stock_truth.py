@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from flightd.core.errors import InputError
-from flightd.core.inventory import LocationRecord, LocationState, Observation
+from flightd.core.inventory import LocationRecord, LocationState, Observation, PlaceFill
 from flightd.core.types import CodeRead
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.code_symbols import Symbol, Symbology
@@ -204,3 +204,20 @@ def test_the_truth_file_is_json_with_every_location(tmp_path: Path) -> None:
         "unreadable",
         "occluded",
     }
+
+
+def test_how_full_places_are_is_right_within_ten_points_and_unknown_is_not_told() -> None:
+    code, place = next((code, place) for code, place in truth().items() if place.fill > 0.5)
+
+    def scored(share: float | None) -> tuple[int, int]:
+        looked = record(code, LocationState.UNREADABLE)
+        assert looked.observation is not None
+        seen = replace(looked, observation=replace(looked.observation, fill=PlaceFill(share)))
+        score = score_stock(truth(), [seen])
+        return score.fill_told, score.fill_right
+
+    assert [scored(share) for share in (place.fill + 0.09, place.fill - 0.11, None)] == [
+        (1, 1),
+        (1, 0),
+        (0, 0),
+    ]

@@ -68,13 +68,16 @@ def test_a_log_without_its_index_is_left_to_a_writer(tmp_path: Path) -> None:
         assert "inventory.db-shm" not in files(tmp_path)
 
 
-def test_a_store_of_the_format_before_is_read_as_it_is(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_store_of_a_format_before_is_read_as_it_is(tmp_path: Path, version: int) -> None:
     with SqliteStore(tmp_path) as writer:
         writer.commit(EMPTY)
     with sqlite3.connect(tmp_path / "inventory.db") as older:
-        older.execute("ALTER TABLE code_read DROP COLUMN module_px")
-        older.execute("DROP TABLE text_search")
-        older.execute("PRAGMA user_version = 2")
+        older.execute("DROP TABLE place_fill")
+        if version == 2:
+            older.execute("ALTER TABLE code_read DROP COLUMN module_px")
+            older.execute("DROP TABLE text_search")
+        older.execute(f"PRAGMA user_version = {version}")
     older.close()
     with SqliteStore(tmp_path, read_only=True) as store:
         assert [record.observation for record in store.locations()] == [EMPTY]
@@ -94,7 +97,7 @@ def test_what_is_no_store_of_today_is_refused_and_not_made_one(tmp_path: Path) -
     with sqlite3.connect(file) as changed:
         changed.execute("PRAGMA user_version = 1")
     changed.close()
-    with pytest.raises(InputError, match="format 1, known here is 3; open it once with flightd inventory"):
+    with pytest.raises(InputError, match="format 1, known here is 4; open it once with flightd inventory"):
         SqliteStore(tmp_path, read_only=True)
     with sqlite3.connect(file) as changed:
         changed.execute("PRAGMA application_id = 7")

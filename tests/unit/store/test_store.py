@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import random
 import resource
 import shutil
@@ -19,7 +20,7 @@ from hypothesis import strategies as st
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import LocationState, Observation, PlannedLocation
+from flightd.core.inventory import LocationState, Observation, PlaceFill, PlannedLocation
 from flightd.core.types import CodeRead
 from flightd.ports import Store
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
@@ -51,6 +52,28 @@ def test_what_was_committed_is_read_back_as_it_was(tmp_path: Path) -> None:
         assert store.history("A-02") == [seen]
         assert store.history("B-1") == [bare]
         assert [observation.id for observation in store.history("A-02")] == [seen.id]
+
+
+@pytest.mark.parametrize("fill", [PlaceFill(0.625, 0.04), PlaceFill(0.0), PlaceFill(None), None])
+def test_how_full_a_place_is_is_read_back_as_it_was_and_merged(
+    tmp_path: Path, fill: PlaceFill | None
+) -> None:
+    seen = replace(look(2), fill=fill)
+    assert seen.id == look(2).id
+    with SqliteStore(tmp_path / "a") as one, SqliteStore(tmp_path / "b") as other:
+        one.commit(seen)
+        other.merge(one)
+        for store in (one, other):
+            assert store.history(seen.location) == [seen]
+            assert store.locations()[0].observation == seen
+        one.forget([seen.id])
+        assert one.history(seen.location) == []
+
+
+@pytest.mark.parametrize("share", [-0.01, 1.01, math.nan])
+def test_no_place_is_fuller_than_full_or_emptier_than_empty(share: float) -> None:
+    with pytest.raises(ValueError, match="outside"):
+        PlaceFill(share)
 
 
 def test_where_in_the_picture_a_code_was_does_not_make_another_look(tmp_path: Path) -> None:
@@ -224,8 +247,9 @@ def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path:
         assert [kept.id for kept in other.history(seen.location)] == [seen.id]
 
 
-TO_2 = ("ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
-OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2}
+TO_3 = ("DROP TABLE place_fill",)
+TO_2 = (*TO_3, "ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
+OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2, 3: TO_3}
 
 
 @pytest.mark.parametrize("version", OLDER)

@@ -1,0 +1,52 @@
+"""What several pictures say together of how full one location is.
+
+Pictures from other places show other sides of the goods and other parts of what is behind them.  Where one
+was taken for a front, they do not agree, and nothing is told.
+"""
+
+from __future__ import annotations
+
+from statistics import median
+from typing import Final
+
+from flightd.core.inventory import LocationState, PlaceFill
+
+_SAME: Final = 0.1
+_LEAST_AGREEING: Final = 0.7
+"""Part of the pictures whose shares must be so near to that in the middle."""
+_LEAST_KNOWN: Final = 0.6
+"""Part of the pictures that must tell a share."""
+_NOTHING: Final = 0.03
+"""A share that goods, however few, do not stay below."""
+
+
+class FillVotes:
+    """The shares that pictures of one location tell."""
+
+    def __init__(self) -> None:
+        self._fills: list[PlaceFill] = []
+
+    def add(self, fill: PlaceFill | None) -> None:
+        """Take in one picture, None for one that does not show the opening."""
+        if fill is not None:
+            self._fills.append(fill)
+
+    def together(self, state: LocationState) -> PlaceFill | None:
+        """What holds of a location of this state, None without any picture of its opening.  What contradicts
+        the state is unknown: the state stands."""
+        if not self._fills:
+            return None
+        if state is LocationState.OCCLUDED:
+            return PlaceFill(None)
+        shares = [fill.share for fill in self._fills if fill.share is not None]
+        if state is LocationState.EMPTY:
+            return PlaceFill(None) if shares and median(shares) > _SAME else PlaceFill(0.0)
+        if len(shares) < _LEAST_KNOWN * len(self._fills):
+            return PlaceFill(None)
+        share = median(shares)
+        agreeing = sum(abs(other - share) <= _SAME for other in shares)
+        if share < _NOTHING or agreeing < _LEAST_AGREEING * len(shares):
+            return PlaceFill(None)
+        overhangs = [fill.overhang_m for fill in self._fills if fill.overhang_m is not None]
+        overhang_m = round(median(overhangs), 3) if len(overhangs) > _LEAST_KNOWN * len(shares) else None
+        return PlaceFill(round(share, 3), overhang_m)

@@ -1,0 +1,32 @@
+"""Rendered shelves that are filled in part: how full their places are told to be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from flightd.mission.scan.code_assignment import Assigner, FrontSight
+from flightd.sim.racks.appearance import RackAppearance
+from flightd.sim.racks.front_camera import FrontCamera
+from flightd.sim.racks.stock_truth import stock_truth
+from flightd.site.site_file import load_site
+from flightd.vision.shelf.shelf_look import read_shelf
+from tests.sim.pictures.shelf_pictures import shelf_pictures
+
+SITE = load_site(Path(__file__).parents[3] / "configs" / "site-racks-small.toml")
+CAMERA = FrontCamera()
+LOOK = replace(RackAppearance(), in_part=1.0)
+SEED = 31
+
+
+def test_how_full_places_are_is_told_within_ten_points() -> None:
+    assigner = Assigner(SITE, FrontSight(CAMERA.lens, CAMERA.mount))
+    truth = stock_truth(SITE, LOOK, CAMERA.lens.fx_px, SEED)
+    told = []
+    for seen in shelf_pictures(SITE, CAMERA, LOOK, SEED, ("A2", "B3")):
+        codes, _ = read_shelf(seen.picture, 0, 0, assigner.places(seen.pose, seen.view.locations))
+        told += [(truth[place.location].fill, place.fill) for place in codes.places]
+    known = [(true, fill.share) for true, fill in told if fill is not None and fill.share is not None]
+    assert len(known) >= 0.7 * len(told) >= 8
+    assert sum(abs(share - true) <= 0.1 for true, share in known) >= 0.9 * len(known)
+    assert max(true for true, _ in known) - min(true for true, _ in known) > 0.3

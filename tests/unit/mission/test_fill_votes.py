@@ -1,0 +1,49 @@
+"""What several pictures say together of how full a location is."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightd.core.inventory import LocationState, PlaceFill
+from flightd.mission.scan.fill_votes import FillVotes
+
+READ, EMPTY = LocationState.READ, LocationState.EMPTY
+
+
+def together(state: LocationState, *shares: float | None) -> PlaceFill | None:
+    votes = FillVotes()
+    for share in shares:
+        votes.add(PlaceFill(share))
+    return votes.together(state)
+
+
+def test_the_share_in_the_middle_holds_where_pictures_agree() -> None:
+    assert together(READ, 0.5, 0.52, 0.58, None) == PlaceFill(0.52)
+
+
+@pytest.mark.parametrize("shares", [(0.3, 0.6), (None, None, 0.5), (0.2, 0.5, 0.8)])
+def test_pictures_that_do_not_agree_or_do_not_tell_leave_it_unknown(shares: tuple[float | None, ...]) -> None:
+    assert together(READ, *shares) == PlaceFill(None)
+
+
+def test_the_share_never_contradicts_the_state() -> None:
+    assert together(EMPTY, 0.0, 0.04) == PlaceFill(0.0)
+    assert together(EMPTY, None, None) == PlaceFill(0.0)
+    assert together(EMPTY, 0.4, 0.4) == PlaceFill(None)
+    assert together(READ, 0.0, 0.01) == PlaceFill(None)
+    assert together(LocationState.OCCLUDED, 0.7, 0.7) == PlaceFill(None)
+
+
+def test_a_location_of_which_no_picture_shows_the_opening_is_not_asked() -> None:
+    votes = FillVotes()
+    votes.add(None)
+    assert votes.together(EMPTY) is None
+
+
+def test_an_overhang_is_told_where_most_pictures_show_it() -> None:
+    votes = FillVotes()
+    for overhang_m in (0.05, 0.07, None):
+        votes.add(PlaceFill(0.5, overhang_m))
+    assert votes.together(READ) == PlaceFill(0.5, 0.06)
+    votes.add(PlaceFill(0.5))
+    assert votes.together(READ) == PlaceFill(0.5)
