@@ -55,7 +55,7 @@ def judge_running(config: Config, found: Running) -> list[Check]:
     return [
         ok("config", found.file),
         _vehicle(config, found),
-        *(check_pose(found.vehicle.pose_use) if found.vehicle is not None else []),
+        *(check_pose(config.vehicle, found.vehicle.pose_use) if found.vehicle is not None else []),
         *_parameters(found),
         _camera(config, found),
         *(check_exposure(config, found.exposure) if found.pictures_hz else []),

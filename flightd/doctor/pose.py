@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from flightd.config.vehicle import VehicleConfig
 from flightd.core.types import PoseUse
 from flightd.doctor.check import Check, ok, warning
 
 
-def check_pose(use: PoseUse) -> list[Check]:
-    """One line, none where it is not to be told of our motion."""
+def check_pose(config: VehicleConfig, use: PoseUse) -> list[Check]:
+    """One line, none where it is not to be told of our motion.  A PX4 that is left the choice flies as well
+    without."""
     if use is PoseUse.NONE:
         return []
     if use is PoseUse.GIVEN:
         return [ok("pose", "the autopilot's estimator takes our motion")]
     text = "the autopilot's estimator does not take our motion"
+    if config.kind == "px4" and config.pose_output == "auto":
+        return [ok("pose", text)]
     return [warning("pose", text, "set what is named of its parameters")]

@@ -82,7 +82,11 @@ def judge(config: VehicleConfig, report: ExaminationReport, cells: int | None = 
         checks.append(warning("heartbeat", str(slow), _BEATS))
     else:
         checks.append(ok("heartbeat", f"{report.heartbeat_hz:.0f} heartbeats a second"))
-    checks += [_judge_range(config, report), _judge_cells(cells, report), *check_pose(report.pose_use)]
+    checks += [
+        _judge_range(config, report),
+        _judge_cells(cells, report),
+        *check_pose(config, report.pose_use),
+    ]
     for found in report.findings:
         remedy = (
             "choose it yourself, in a ground station"

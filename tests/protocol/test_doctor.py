@@ -194,19 +194,35 @@ def test_the_job_decides_what_is_right(tmp_path: Path, doctor: Doctor) -> None:
 def test_an_estimator_that_could_take_our_motion_is_fit_to_fly_and_set_by_a_fix(
     tmp_path: Path, doctor: Doctor
 ) -> None:
-    with serving(Px4Peer) as (peer, url):
-        config = write_config(tmp_path, {"url": url, "kind": "px4", "pose_output": "auto"})
+    with serving(ArduCopterPeer) as (peer, url):
+        config = write_config(tmp_path, {"url": url, "pose_output": "auto"})
         code, out, _ = doctor(config, "--json")
         document = json.loads(out)
         assert (code, by_name(document, "pose")["level"]) == (0, "warning")
-        assert [(entry["name"], entry["advised"]) for entry in document["parameters"]] == [
-            ("EKF2_EV_CTRL", True)
-        ]
+        advised = {entry["name"] for entry in document["parameters"] if entry["advised"]}
+        assert "EK3_SRC1_VELXY" in advised
+        assert len(advised) == len(document["parameters"])
         code, out, _ = doctor(config, "--fix", "--yes", "--json")
         document = json.loads(out)
-        assert (code, document["fixed"]) == (0, ["EKF2_EV_CTRL"])
+        assert (code, set(document["fixed"])) == (0, advised)
         assert by_name(document, "pose")["level"] == "ok"
-        assert peer.parameters["EKF2_EV_CTRL"] == 4
+        assert peer.parameters["EK3_SRC1_VELXY"] == 6
+
+
+@pytest.mark.parametrize(("choice", "code", "level"), [("auto", 0, "ok"), ("odometry", 1, "warning")])
+def test_a_px4_that_takes_no_motion_of_ours_is_fit_and_left_so_unless_it_is_demanded(
+    tmp_path: Path, doctor: Doctor, choice: str, code: int, level: str
+) -> None:
+    with serving(Px4Peer, parameters={"EKF2_EV_CTRL": 0}) as (peer, url):
+        config = write_config(tmp_path, {"url": url, "kind": "px4", "pose_output": choice})
+        found, out, _ = doctor(config, "--json")
+        document = json.loads(out)
+        check = by_name(document, "pose")
+        assert (found, check["level"]) == (code, level)
+        assert check["text"] == "the autopilot's estimator does not take our motion"
+        assert [entry["name"] for entry in document["parameters"]] == ["EKF2_EV_CTRL"][:code]
+        doctor(config, "--fix", "--yes", "--json")
+        assert peer.parameters["EKF2_EV_CTRL"] == 4 * code
 
 
 def test_px4_behind_either_adapter_and_the_wrong_kind(tmp_path: Path, doctor: Doctor) -> None:

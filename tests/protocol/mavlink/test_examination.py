@@ -17,7 +17,7 @@ from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding, judge
 from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
 from flightd.adapters.vehicle.mavlink.pose_sharing import pose_use
-from flightd.adapters.vehicle.mavlink.required_parameters import RULES
+from flightd.adapters.vehicle.mavlink.required_parameters import RULES, Job, advice_for, rules_for
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import too_slow
 from flightd.config.vehicle import PoseChoice
 from flightd.core.errors import UnavailableError
@@ -113,9 +113,17 @@ def test_what_our_motion_needs_is_advised_where_it_is_left_to_the_autopilot_else
     assert all(rule.advised is (choice == "auto") for rule in rules)
     assert all(rule.better is not None and rule.fits(rule.better) for rule in rules)
     assert all("\n" not in str(judge(rule, (rule.names[0], -7.0))) for rule in rules)
-    shipped = dict(shipped_parameters())[firmware]
-    if choice == "auto":
-        assert all(rule.fits(shipped[rule.names[0]]) for rule in rules)
+
+
+def test_an_arducopter_left_the_choice_takes_our_motion_as_shipped_and_a_px4_is_left_as_it_is() -> None:
+    job = Job(pose_output="auto")
+    for firmware, values in shipped_parameters():
+        rules = pose_rules(firmware, "auto", landing_target=False)
+        taken = firmware is Firmware.ARDUPILOT
+        assert all(rule.fits(values[rule.names[0]]) for rule in rules) is taken
+        assert advice_for(firmware, job) == (rules if taken else ())
+    demanded = {rule.names[0] for rule in rules_for(Firmware.PX4, Job(pose_output="odometry"))}
+    assert "EKF2_EV_CTRL" in demanded
 
 
 @pytest.mark.parametrize("bits", range(16))

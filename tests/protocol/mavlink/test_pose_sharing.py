@@ -20,7 +20,7 @@ from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
 from flightd.config.vehicle import PoseChoice, VehicleConfig
 from flightd.core.refusal import words
 from flightd.core.shared_pose import SharedPose
-from flightd.core.types import Attitude, Demand, LandedState, PoseUse, VehicleState
+from flightd.core.types import Attitude, Demand, Event, EventLevel, LandedState, PoseUse, VehicleState
 from flightd.ports import PoseTaker
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig
@@ -97,10 +97,12 @@ async def share(rig: Rig, seen: list[float]) -> None:
         seen.append(math.degrees(drift))
 
 
-@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_as_shipped_it_is_armed_and_its_attitude_stays_true_by_our_motion(kind: str) -> None:
+@pytest.mark.parametrize(("kind", "parameters"), [("ardupilot", {}), ("px4", {"EKF2_EV_CTRL": 4})])
+def test_set_to_take_our_motion_it_is_armed_and_its_attitude_stays_true(
+    kind: str, parameters: dict[str, float]
+) -> None:
     async def test() -> None:
-        async with rig_of(kind) as rig:
+        async with rig_of(kind, **parameters) as rig:
             seen: list[float] = []
             sharing = asyncio.create_task(share(rig, seen))
             try:
@@ -126,18 +128,27 @@ def test_as_shipped_it_is_armed_and_its_attitude_stays_true_by_our_motion(kind: 
 
 
 @pytest.mark.parametrize(
-    ("kind", "parameters"),
+    ("kind", "parameters", "level"),
     [
-        ("ardupilot", {"VISO_TYPE": 0.0}),
-        ("px4", {"EKF2_EV_CTRL": 0}),
-        ("px4", {"EKF2_EV_CTRL": 13}),
+        ("ardupilot", {"VISO_TYPE": 0.0}, EventLevel.WARNING),
+        ("px4", {}, EventLevel.INFO),  # as shipped
+        ("px4", {"EKF2_EV_CTRL": 13}, EventLevel.INFO),
     ],
 )
 def test_one_that_is_not_set_up_for_it_is_told_nothing_and_flies(
-    kind: str, parameters: dict[str, float]
+    kind: str, parameters: dict[str, float], level: EventLevel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    events: list[Event] = []
+
     async def test() -> None:
         async with rig_of(kind, **parameters) as rig:
+            notify = rig.vehicle.notify
+
+            def keep(event: Event) -> None:
+                events.append(event)
+                notify(event)
+
+            monkeypatch.setattr(rig.vehicle, "notify", keep)
             sharing = asyncio.create_task(share(rig, []))
             try:
                 await rig.take_off()
@@ -146,6 +157,7 @@ def test_one_that_is_not_set_up_for_it_is_told_nothing_and_flies(
             assert rig.known().pose_use is PoseUse.NOT_TAKEN
             assert not rig.peer.vision.is_heard
             assert "does not take our motion" in "".join(rig.texts() or ())
+            assert [event.level for event in events if event.name == "pose_output"] == [level]
 
     virtual(test())
 

@@ -129,6 +129,8 @@ class MavlinkVehicle(abc.ABC):
         self._examined = False
         """All that the autopilot answers of its parameters was read."""
         self._told_use = PoseUse.NONE
+        wanted = self._advice or job.pose_output != "auto"
+        self._untaken = EventLevel.WARNING if wanted else EventLevel.INFO
         self._reboots = 0
         self._version = ""
         self._heard = asyncio.Event()
@@ -363,7 +365,7 @@ class MavlinkVehicle(abc.ABC):
         given = self._told_use is PoseUse.GIVEN
         text = "its estimator takes our motion" if given else "its estimator does not take our motion"
         _LOG.info("%s", text)
-        level = EventLevel.INFO if given else EventLevel.WARNING
+        level = EventLevel.INFO if given else self._untaken
         self.notify(Event(self._clock.now_ns(), level, "pose_output", text))
 
     async def _mind_beats(self) -> None:
