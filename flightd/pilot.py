@@ -20,7 +20,7 @@ from flightd.mission.flight.steering import Steering
 from flightd.mission.guidance import Guidance, MissionInputs
 from flightd.mission.mission import Mission
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
-from flightd.mission.safety.last_resort import LastResort, sinking_by_sight
+from flightd.mission.safety.last_resort import LastResort, Sinking, sinking_by_sight
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.site.site import Site
@@ -92,7 +92,10 @@ class Pilot:
     @property
     def possible_commands(self) -> frozenset[CommandKind]:
         """What an operator may order now; nothing once the mission is not stepped any more."""
-        return frozenset() if self._last_resort.given_up else self._mission.possible_commands
+        resort = self._last_resort
+        if resort.given_up:
+            return frozenset({CommandKind.LAND, CommandKind.STOP}) if resort.sinks_by_sight else frozenset()
+        return self._mission.possible_commands
 
     def another_resort(self) -> LastResort:
         """For whoever calls `step`: what catches there may fail, too."""
@@ -128,6 +131,8 @@ class Pilot:
             except Exception as err:  # noqa: BLE001 - whatever it is, the drone has to come down
                 resort.caught(tick.now_ns, err)
             else:
+                if self._answered.phase is Phase.RECOVER:
+                    resort.found_flying()
                 return self._answered
         self._answered = resort.answer(
             tick,
@@ -185,14 +190,17 @@ class Pilot:
         stand_yaw_rad = self._mission.stand[1]
         return self._steering.step(inputs, guidance, push_mps2, stand_yaw_rad, known.lead, known.conditions)
 
-    def _sink_by_sight(self, tick: TickInput) -> AttitudeSetpoint | None:
-        """Without the mission: what has failed may be that alone."""
+    def _sink_by_sight(self, tick: TickInput) -> Sinking | None:
+        """Without a step of the mission: what has failed may be that alone."""
+        if self._config.vehicle.kind == "ardrone":  # it hovers by itself, and takes nothing but LAND then
+            return None
         dt_s = self._since_last_s(tick.now_ns)
         self._estimator.take(tick, self._commanded)
         known = self._estimator.step(tick.now_ns)
         inputs = self._inputs(tick, dt_s, known)
         guidance = sinking_by_sight(inputs, self._config.mission.land_mps)
-        return None if guidance is None else self._steer(inputs, guidance, known)
+        setpoint = self._commanded = None if guidance is None else self._steer(inputs, guidance, known)
+        return None if setpoint is None else Sinking(setpoint, known.shared)
 
     def _take(self, commands: Sequence[Command], now_ns: int) -> None:
         """Give the mission all orders, also those behind one that fails; its error is raised then."""

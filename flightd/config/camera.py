@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, TypeAlias
+from typing import Annotated, Self, TypeAlias
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from flightd.config.exposure_keys import ExposureTime, Gain, MainsHz
 from flightd.config.section import Section, unit
@@ -84,6 +84,12 @@ class CameraConfig(OpticsSection):
     exposure_s: ExposureTime = 0.0
     gain: Gain = None
     anti_flicker_hz: MainsHz = 0
+
+    @model_validator(mode="after")
+    def _reads_out_in_time(self) -> Self:
+        if self.readout_s * self.fps > 1.0:
+            raise ValueError(f"readout_s <= 1 / fps is required: rows of one frame at {self.fps:g} a second")
+        return self
 
     def exposure_order(self) -> ExposureOrder:
         """What the camera is to be set to."""

@@ -76,7 +76,8 @@ def _put_back(points_px: Matrix, lens: Lens, motion: ImageMotion, readout_s: flo
     along = np.column_stack([rays, np.ones(len(rays))])
     speeds = -motion.travel_per_s - np.cross(motion.turn_radps, along)
     flow_px: Matrix = (speeds[:, :2] - rays * speeds[:, 2:]) * focal
-    late_s = points_px[:, 1:] / lens.height_px * readout_s
+    # a lens without distortion would show more than the picture's rows
+    late_s = np.clip(points_px[:, 1:] / lens.height_px, -0.5, 0.5) * readout_s
     back: Matrix = points_px - flow_px * late_s
     return back
 
@@ -89,4 +90,12 @@ def _through(line: Line, start: Sequence[float], end: Sequence[float]) -> Line:
     turned = math.atan2(-dx, dy)
     rho_px, theta_rad = normalise_line(start[0] * math.cos(turned) + start[1] * math.sin(turned), turned)
     ends = sorted(y * math.cos(theta_rad) - x * math.sin(theta_rad) for x, y in (start, end))
-    return replace(line, rho_px=rho_px, theta_rad=theta_rad, start_px=ends[0], end_px=ends[1])
+    is_flipped = math.cos(theta_rad - line.theta_rad) < 0.0
+    return replace(
+        line,
+        rho_px=rho_px,
+        theta_rad=theta_rad,
+        start_px=ends[0],
+        end_px=ends[1],
+        rho_theta_cov=-line.rho_theta_cov if is_flipped else line.rho_theta_cov,
+    )

@@ -11,10 +11,12 @@ from typing import TypeVar
 from flightd.config.mission import MissionConfig
 from flightd.control.flight_controller import Reference
 from flightd.core.scanning import Finding, Settled
+from flightd.core.shared_pose import SharedPose
 from flightd.core.tick import StepFailure, TickInput, TickOutput
 from flightd.core.types import (
     OVER,
     AttitudeSetpoint,
+    CommandKind,
     Demand,
     Event,
     EventLevel,
@@ -32,9 +34,10 @@ _HEARTBEAT_NS = 2_000_000_000
 """Heartbeats come each second: without a newer one, modes and arming are those of the past."""
 _GIVE_UP_NS = 60_000_000_000
 """A vehicle that nobody heard for so long is not waited for."""
-_BY_SIGHT_NS = 10_000_000_000
-"""In so long it has come down by the lines, from as high as anything is flown."""
+_BY_SIGHT_NS = 20_000_000_000
+"""For so long it may sink by the lines: from higher its autopilot goes on."""
 _LEFT_TO_AUTOPILOT_M = 0.4
+_DOWN = frozenset({CommandKind.STOP, CommandKind.LAND})
 _SIGHT_S, _TOLD_S = 0.3, 0.2
 """How old the floor's picture and the attitude may be to sink by them."""
 # constants: what is answered here calls as little as possible of what may have failed
@@ -49,6 +52,7 @@ class Fallback:
     phase: Phase
     demand: Demand
     setpoint: AttitudeSetpoint | None
+    shared: SharedPose | None = None
 
     def onto(
         self,
@@ -66,11 +70,19 @@ class Fallback:
             reason=_WHY,
             pose=None,
             tracks=None,
-            shared=None,
+            shared=self.shared,
             events=events,
             findings=findings,
             settled=settled,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Sinking:
+    """At rest over the floor and down: what goes out, and what the autopilot's estimator may be told."""
+
+    setpoint: AttitudeSetpoint
+    shared: SharedPose | None = None
 
 
 class LastResort:
@@ -88,6 +100,7 @@ class LastResort:
         self._end: Phase | None = None
         self._failures = 0
         self._by_sight_until_ns: int | None = None
+        self._was_adopted = False
         self.failure: StepFailure | None = None
         """What the newest step raised, None where it raised nothing."""
         self.seen: VehicleState | None = None
@@ -99,9 +112,18 @@ class LastResort:
         return self._failures > 0
 
     @property
+    def sinks_by_sight(self) -> bool:
+        """The mission is not stepped any more, and the drone is still steered."""
+        return self.given_up and self._by_sight_until_ns not in {None, 0}
+
+    @property
     def given_up(self) -> bool:
         """The mission is not stepped any more."""
         return self._failures > 1
+
+    def found_flying(self) -> None:
+        """The drone was taken over in the air: its lines need not be those that they are taken for."""
+        self._was_adopted = True
 
     def caught(self, now_ns: int, err: Exception) -> None:
         """The step has raised this."""
@@ -114,13 +136,13 @@ class LastResort:
         last: TickOutput,
         drain_events: Callable[[], tuple[Event, ...]],
         drain_findings: Callable[[], tuple[tuple[Finding, ...], tuple[Settled, ...]]],
-        by_sight: Callable[[], AttitudeSetpoint | None],
+        by_sight: Callable[[], Sinking | None],
     ) -> TickOutput:
         """What goes out; `last` is what did before, two drain what the mission's parts still have to tell,
         `by_sight` is how it sinks at rest over the floor, None where that is not known."""
         answer = Fallback(last.phase, last.demand, last.setpoint and AttitudeSetpoint(tick.now_ns))
         if self.given_up:
-            answer = self._sighted(tick.now_ns, self.step(tick.now_ns, tick.vehicle, last.phase), by_sight)
+            answer = self._sighted(tick, last, self.step(tick.now_ns, tick.vehicle, last.phase), by_sight)
         no_events: tuple[Event, ...] = ()
         nothing: tuple[tuple[Finding, ...], tuple[Settled, ...]] = ((), ())
         findings, settled = _rescued(drain_findings, nothing)
@@ -151,19 +173,24 @@ class LastResort:
         return Fallback(Phase.LAND, Demand.DISARM if standing else Demand.LAND, sinking)
 
     def _sighted(
-        self, now_ns: int, otherwise: Fallback, by_sight: Callable[[], AttitudeSetpoint | None]
+        self, tick: TickInput, last: TickOutput, otherwise: Fallback, by_sight: Callable[[], Sinking | None]
     ) -> Fallback:
-        """At rest over the floor in place of what is level; once that ends it stays so."""
+        """At rest over the floor in place of what is level; once that ends it stays so.  A landing of the
+        autopilot's own that was asked for, before or by an order, is not put off."""
         if self._by_sight_until_ns is None:
-            self._by_sight_until_ns = now_ns + _BY_SIGHT_NS
+            self._was_adopted |= last.phase is Phase.RECOVER
+            lands = last.demand in {Demand.LAND, Demand.DISARM}
+            self._by_sight_until_ns = 0 if lands or self._was_adopted else tick.now_ns + _BY_SIGHT_NS
         if otherwise.setpoint is None or otherwise.demand is not Demand.LAND:
             return otherwise
-        nothing: AttitudeSetpoint | None = None
-        setpoint = _rescued(by_sight, nothing) if now_ns < self._by_sight_until_ns else None
-        if setpoint is None:
+        if any(command.kind in _DOWN for command in tick.commands):
+            self._by_sight_until_ns = 0
+        nothing: Sinking | None = None
+        sinking = _rescued(by_sight, nothing) if tick.now_ns < self._by_sight_until_ns else None
+        if sinking is None:
             self._by_sight_until_ns = 0
             return otherwise
-        return Fallback(Phase.LAND, Demand.KEEP, setpoint)
+        return Fallback(Phase.LAND, Demand.KEEP, sinking.setpoint, sinking.shared)
 
     def _news(self, now_ns: int, before: Phase, after: Phase) -> tuple[Event, ...]:
         events = []

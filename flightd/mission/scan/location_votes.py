@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import combinations
 
-from flightd.core.inventory import LocationState
+from flightd.core.inventory import LocationState, PlaceFill
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
 from flightd.mission.scan.code_votes import CodeVotes
@@ -129,6 +129,10 @@ class LocationVotes:
         state = LocationState.SEVERAL if several else LocationState.READ
         return self._found(state, confidence, pose, believed)
 
+    def fill(self, state: LocationState) -> PlaceFill | None:
+        """How full the place is by all looks, if it is in this state."""
+        return self._fills.together(state)
+
     def _found(
         self, state: LocationState, confidence: float, pose: BodyPose, believed: Sequence[PlacedRead] = ()
     ) -> Finding:
@@ -145,7 +149,7 @@ class LocationVotes:
             y_m=pose.y_m,
             height_m=pose.height_m,
             yaw_rad=pose.yaw_rad,
-            fill=self._fills.together(state),
+            fill=self.fill(state),
         )
 
     def _believed(self) -> tuple[tuple[PlacedRead, ...], bool]:

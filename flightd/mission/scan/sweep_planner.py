@@ -19,6 +19,8 @@ from flightd.site.ways import NoWayError
 
 _WHOLE_SHARE = 0.9
 """Levels are flown past together only where each place of them is so far in the picture."""
+_LEADS_OUT = 2
+"""So many nodes beyond what is counted a way is flown on to leave the aisle: farther may be for nothing."""
 _LEAST_NODES = 2
 """Places before fewer nodes are sooner counted by stopping."""
 
@@ -174,7 +176,7 @@ class SweepPlanner:
             return
         step = 1 if ways[-1].target > ways[-1].start else -1
         ahead = range(ways[-1].target, len(nodes) if step > 0 else -1, step)
-        exits = (index for index in ahead if self._is_exit(nodes[index]))
+        exits = (index for index in ahead[: _LEADS_OUT + 1] if self._is_exit(nodes[index]))
         target = next(exits, ways[-1].target)
         if self._leads_on(nodes, ways, target):
             ways[-1] = replace(ways[-1], target=target)

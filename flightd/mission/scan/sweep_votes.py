@@ -122,7 +122,8 @@ class SweepVotes:
         enough = self._whole_empty >= self._params.sweep.unread_views and not self._whole_occupied
         if not enough or self._votes.any_read:
             return None
-        return replace(found, state=LocationState.EMPTY, confidence=SEEN_EMPTY)
+        fill = self._votes.fill(LocationState.EMPTY)
+        return replace(found, state=LocationState.EMPTY, confidence=SEEN_EMPTY, fill=fill)
 
     def _unread(self, found: Finding) -> Finding | Undecided:
         """Nothing is unreadable by few views, by bad light, or from one angle."""

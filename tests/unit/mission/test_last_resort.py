@@ -11,12 +11,21 @@ import pytest
 
 from flightd.core.shared_pose import SharedPose
 from flightd.core.tick import TickInput, TickOutput
-from flightd.core.types import AttitudeSetpoint, Demand, GridPose, LandedState, Phase, VehicleState
+from flightd.core.types import (
+    AttitudeSetpoint,
+    Command,
+    CommandKind,
+    Demand,
+    GridPose,
+    LandedState,
+    Phase,
+    VehicleState,
+)
 from flightd.mission.event_log import EventLog
 from flightd.mission.guidance import Guide, MissionInputs, Warnings
 from flightd.mission.plan.flight_plan import make_plan
 from flightd.mission.plan.itinerary import Itinerary
-from flightd.mission.safety.last_resort import LastResort, sinking_by_sight
+from flightd.mission.safety.last_resort import LastResort, Sinking, sinking_by_sight
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import POLICY, SITE
 from tests.unit.mission.test_readiness import VEHICLE
@@ -25,6 +34,18 @@ NOW_NS = 10**9
 LONG_AGO = replace(VEHICLE.attitude, stamp_ns=NOW_NS - 4 * 10**9)
 LOST_NS = NOW_NS - 4 * 10**9
 FLYING = replace(VEHICLE, armed=True, in_control=True, landed=LandedState.IN_AIR, height_m=1.5)
+
+
+SURE = (1e-4, 1e-4)
+SHARED = SharedPose(1, VEHICLE.attitude, 0.0, 3.0, 0.0, 0.5, 0.0, 1.5, SURE, SURE, 1e-4, 1.0)
+FOLLOWS = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, None, None)
+
+
+def given_up() -> LastResort:
+    resort = LastResort(configured().mission)
+    for text in ("first", "second"):
+        resort.caught(NOW_NS, ValueError(text))
+    return resort
 
 
 def answers(vehicle: VehicleState | None, before: Phase = Phase.FOLLOW) -> tuple[Phase, Demand, bool]:
@@ -96,16 +117,36 @@ def test_without_the_mission_it_sinks_by_sight_once_and_never_again_after_that_h
     leaning = AttitudeSetpoint(NOW_NS, 0.05, climb_mps=-0.3)
     last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, None, None)
 
-    def broken() -> AttitudeSetpoint:
+    def broken() -> Sinking:
         raise ValueError("this, too")
 
-    def answered(by_sight: Callable[[], AttitudeSetpoint | None], now_ns: int = NOW_NS) -> TickOutput:
+    def answered(by_sight: Callable[[], Sinking | None], now_ns: int = NOW_NS) -> TickOutput:
         return resort.answer(replace(flying, now_ns=now_ns), last, tuple, lambda: ((), ()), by_sight)
 
-    assert (answered(lambda: leaning).setpoint, answered(lambda: leaning).demand) == (leaning, Demand.KEEP)
-    for by_sight in (broken, lambda: leaning):
+    sinking = answered(lambda: Sinking(leaning, SHARED))
+    assert (sinking.setpoint, sinking.demand, sinking.shared) == (leaning, Demand.KEEP, SHARED)
+    for by_sight in (broken, lambda: Sinking(leaning)):
         level = answered(by_sight)
         assert (level.demand, level.setpoint and level.setpoint.roll_rad) == (Demand.LAND, 0.0)
+
+
+@pytest.mark.parametrize("kind", [CommandKind.STOP, CommandKind.LAND, CommandKind.PAUSE])
+def test_an_order_to_come_down_is_not_put_off(kind: CommandKind) -> None:
+    resort = given_up()
+    ordered = TickInput(NOW_NS, vehicle=FLYING, commands=(Command("order", kind),))
+    leaning = AttitudeSetpoint(NOW_NS, 0.05)
+    answer = resort.answer(ordered, FOLLOWS, tuple, lambda: ((), ()), lambda: Sinking(leaning))
+    assert (answer.demand is Demand.LAND) is (kind is not CommandKind.PAUSE)
+    assert resort.sinks_by_sight is (kind is CommandKind.PAUSE)
+
+
+def test_a_landing_that_was_asked_for_and_one_found_flying_are_left_to_the_autopilot() -> None:
+    flying, leaning = TickInput(NOW_NS, vehicle=FLYING), AttitudeSetpoint(NOW_NS, 0.05)
+    adopted = given_up()
+    adopted.found_flying()
+    for resort, last in ((given_up(), replace(FOLLOWS, demand=Demand.LAND)), (adopted, FOLLOWS)):
+        answer = resort.answer(flying, last, tuple, lambda: ((), ()), lambda: Sinking(leaning))
+        assert (answer.demand, answer.setpoint and answer.setpoint.roll_rad) == (Demand.LAND, 0.0)
 
 
 def test_sinking_by_sight_ends_by_time() -> None:
@@ -114,13 +155,13 @@ def test_sinking_by_sight_ends_by_time() -> None:
     for text in ("first", "second"):
         resort.caught(NOW_NS, ValueError(text))
     demands = []
-    for now_s in (1, 10, 12):
+    for now_s in (1, 20, 22):
         now_ns = now_s * 10**9
         heard = replace(VEHICLE.attitude, stamp_ns=now_ns)
         vehicle = replace(FLYING, attitude=heard, heartbeat_ns=now_ns)
         leaning = AttitudeSetpoint(now_ns, 0.05)
         tick = TickInput(now_ns, vehicle=vehicle)
-        demands.append(resort.answer(tick, last, tuple, lambda: ((), ()), lambda: leaning).demand)  # noqa: B023
+        demands.append(resort.answer(tick, last, tuple, lambda: ((), ()), lambda: Sinking(leaning)).demand)  # noqa: B023
     assert demands == [Demand.KEEP, Demand.KEEP, Demand.LAND]
 
 
@@ -166,11 +207,8 @@ def test_it_sinks_by_sight_only_where_sight_attitude_height_and_vehicle_tell_eno
 
 def test_what_is_no_longer_known_is_told_to_nobody() -> None:
     resort = LastResort(configured().mission)
-    shared = SharedPose(
-        1, VEHICLE.attitude, 0.0, 3.0, 0.0, 0.5, 0.0, 1.5, (1e-4, 1e-4), (1e-4, 1e-4), 1e-4, 1.0
-    )
     at_a2 = GridPose(0, "A2", 0, 0, 0.0, 3.0, 0.1, 0.4, 0, 1.5, (0.0,) * 9, 1.0)
-    last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, at_a2, None, shared=shared)
+    last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, at_a2, None, shared=SHARED)
     resort.caught(NOW_NS, ValueError("first"))
     answer = resort.answer(TickInput(NOW_NS, vehicle=FLYING), last, tuple, lambda: ((), ()), lambda: None)
     assert (answer.pose, answer.tracks, answer.shared) == (None, None, None)
