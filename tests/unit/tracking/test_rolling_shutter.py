@@ -89,3 +89,16 @@ def test_a_shutter_that_opens_for_all_rows_at_once_bends_nothing() -> None:
     seen = LineSet(0, 0, 640, 360, (line_through((-100.0, 10.0), (120.0, 30.0)),), (), "combined")
     motion = ImageMotion.of((0.5, 0.0, 0.0), (0.8, 0.0), 0.0, 1.5, Mount())
     assert as_of_one_moment(seen, LENS, motion, 0.0) is seen
+
+
+def test_a_line_whose_normal_turns_over_keeps_what_its_errors_have_in_common() -> None:
+    motion = ImageMotion.of((0.5, 0.0, 0.0), (0.0, 0.0), 0.0, 1.5, Mount())
+    straight = [line_through((40.0, -150.0), (40.0 + dx_px, 150.0)) for dx_px in (0.4, -0.4)]
+    bent = tuple(replace(line, rho_theta_cov=2e-3) for line in straight)
+    seen = LineSet(0, 0, LENS.width_px, LENS.height_px, bent, (), "combined")
+    flipped = []
+    for line, before in zip(as_of_one_moment(seen, LENS, motion, READOUT_S).lines, bent, strict=True):
+        flipped.append(math.cos(line.theta_rad - before.theta_rad) < 0.0)
+        assert flipped[-1] is (line.rho_px * before.rho_px < 0.0)
+        assert line.rho_theta_cov == (-2e-3 if flipped[-1] else 2e-3)
+    assert any(flipped)
