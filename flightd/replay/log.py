@@ -169,6 +169,10 @@ def _opened(path: Path) -> BinaryIO:
     raise InputError("not a flight log (an MCAP file was expected)", file=path)
 
 
+_PARTS = frozenset({"fill"})
+"""Null is there no number that is not known, but a part that is not there."""
+
+
 @cache
 def _decoder(kind: type) -> Decoder:
     if kind is Event:
@@ -191,7 +195,9 @@ def with_nan(value: object) -> object:
     if value is None:
         return math.nan
     if isinstance(value, dict):
-        return {key: with_nan(item) for key, item in value.items()}
+        return {
+            key: item if item is None and key in _PARTS else with_nan(item) for key, item in value.items()
+        }
     if isinstance(value, list):
         return [with_nan(item) for item in value]
     return value

@@ -198,7 +198,7 @@ COVERED: dict[str, tuple[str, ...]] = {
         "mavlink/test_transport.py::test_a_serial_line_is_opened_raw_heard_and_found_again_after_a_loss",
     ),
     "no origin without GPS": (
-        "mavlink/test_link_care.py::test_an_estimator_that_gets_our_pose_gets_an_origin_until_it_reports_one",
+        "mavlink/test_link_care.py::test_guided_by_our_pose_gets_an_origin_until_it_reports_one",
     ),
     "unsigned, replayed or forged frames; a key given or missing": (
         "mavlink/test_codec.py::test_signed_frames_pass_once_and_unsigned_or_wrongly_signed_ones_do_not",

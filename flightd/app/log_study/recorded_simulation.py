@@ -14,6 +14,7 @@ from flightd.core.errors import InputError
 from flightd.core.topics import Document, Topic
 from flightd.replay.log import FlightLog, read_log
 from flightd.sim.scenario.scenario import Scenario
+from flightd.sim.unknowns import Unknowns
 
 
 def recorded_simulation(log: Path) -> tuple[Simulation, dict[str, Any]] | None:
@@ -33,6 +34,7 @@ def recorded_simulation(log: Path) -> tuple[Simulation, dict[str, Any]] | None:
         speed=None,
         folder=log.parent,
         order=flown.order,
+        unknowns=_unknowns(truth),
     )
     return simulation, told
 
@@ -45,6 +47,16 @@ def _summary(path: Path) -> dict[str, Any]:
     if not isinstance(told, dict) or not isinstance(told.get("seed"), int):
         raise InputError("is no summary of a simulated flight: no seed", file=path)
     return told
+
+
+def _unknowns(truth: Path) -> Unknowns:
+    """What of the world a flight is judged by: how far its lines lay beside their map."""
+    told = read_log(truth, {Topic.UNKNOWNS}).messages(Document)
+    try:
+        drawn = json.loads(told[-1].text) if told else {}
+        return Unknowns(map_error_m=float(drawn.get("map_error_m", 0.0)))
+    except (ValueError, TypeError, AttributeError) as err:
+        raise InputError(f"what its world kept to itself cannot be read: {err}", file=truth) from None
 
 
 def _scenario(log: FlightLog) -> Scenario:

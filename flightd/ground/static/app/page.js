@@ -38,9 +38,12 @@ function Loaded({ page, route }) {
   const { component: Component, failed } = loaded(page, redraw);
   if (Component) return html`<${Component} key=${page.path} route=${route} />`;
   if (!failed) return html`<p class="loading quiet" role="status">${say("Loading …")}</p>`;
-  const again = () => {
+  // a browser may keep a module that failed as long as the document lives: anew, if there is who sends it
+  const again = async () => {
+    const isThere = await fetch("/", { cache: "no-store" }).then((answer) => answer.ok, () => false);
+    if (isThere) return location.reload();
     forget(page);
-    redraw();
+    return redraw();
   };
   return html`
     <section class="card empty"><h2>${say("The page cannot be loaded")}</h2>
