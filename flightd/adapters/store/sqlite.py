@@ -310,6 +310,7 @@ class SqliteStore:
         rows = [(look,) for look in looks]
         with self._transaction():
             self._db.executemany("DELETE FROM code_read WHERE observation = ?", rows)
+            self._db.executemany("DELETE FROM text_search WHERE observation = ?", rows)
             self._db.executemany("DELETE FROM place_fill WHERE observation = ?", rows)
             self._db.executemany("DELETE FROM observation WHERE id = ?", rows)
 

@@ -21,6 +21,16 @@ def text(
 FOUND = (text("B1"), text(date(2027, 1, 31), ValueKind.EXPIRY), text(Decimal(48), ValueKind.QUANTITY, 0.5))
 
 
+def test_a_look_is_taken_out_with_what_was_found_in_it(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as store:
+        for number in (1, 2):
+            store.commit(look(number))
+            store.keep_texts(look(number).id, FOUND, "one")
+        store.forget([look(1).id])
+        assert [seen.id for seen, _ in store.looks()] == [look(2).id]
+        assert not store.was_searched(look(1).id, "one")
+
+
 def test_what_a_search_found_is_read_back_with_its_look(tmp_path: Path) -> None:
     seen = look(1)
     with SqliteStore(tmp_path) as store:
