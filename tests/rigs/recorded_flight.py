@@ -23,7 +23,8 @@ def fly_once(shared: Path) -> Path:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not flown.exists():
             unfinished = shared / "recorded-flight.unfinished"
-            _fly(unfinished, small_camera_file(shared))
+            # sensors are fitted to a log by its lines as they are, which a rolling shutter bends
+            _fly(unfinished, small_camera_file(shared, readout_s=0.0))
             unfinished.rename(flown)
     return flown
 

@@ -100,7 +100,7 @@ class LastResort:
         self._end: Phase | None = None
         self._failures = 0
         self._by_sight_until_ns: int | None = None
-        self._was_adopted = False
+        self._was_adopted = self._sinks = False
         self.failure: StepFailure | None = None
         """What the newest step raised, None where it raised nothing."""
         self.seen: VehicleState | None = None
@@ -114,7 +114,7 @@ class LastResort:
     @property
     def sinks_by_sight(self) -> bool:
         """The mission is not stepped any more, and the drone is still steered."""
-        return self.given_up and self._by_sight_until_ns not in {None, 0}
+        return self._sinks
 
     @property
     def given_up(self) -> bool:
@@ -181,12 +181,14 @@ class LastResort:
             self._was_adopted |= last.phase is Phase.RECOVER
             lands = last.demand in {Demand.LAND, Demand.DISARM}
             self._by_sight_until_ns = 0 if lands or self._was_adopted else tick.now_ns + _BY_SIGHT_NS
+        self._sinks = False
         if otherwise.setpoint is None or otherwise.demand is not Demand.LAND:
             return otherwise
         if any(command.kind in _DOWN for command in tick.commands):
             self._by_sight_until_ns = 0
         nothing: Sinking | None = None
         sinking = _rescued(by_sight, nothing) if tick.now_ns < self._by_sight_until_ns else None
+        self._sinks = sinking is not None
         if sinking is None:
             self._by_sight_until_ns = 0
             return otherwise

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -118,9 +120,11 @@ async def test_a_picture_is_written_to_a_file(tmp_path: Path) -> None:
 
 @in_real_time
 async def test_nobody_listening_is_one_line() -> None:
-    async with serving(local()) as link:
-        where = at(link)
-    code, out, err = await flightctl(*where[:4], "--timeout", "0.5", "home", "--json")
+    with closing(socket.socket()) as held:  # nobody else gets its port meanwhile
+        held.bind(("127.0.0.1", 0))
+        port = str(held.getsockname()[1])
+        where = "--status-port", port, "--command-port", port
+        code, out, err = await flightctl(*where, "--timeout", "0.5", "home", "--json")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "nobody listens" in err
 
