@@ -22,6 +22,7 @@ from flightd.site.site_file import load_site
 from flightd.vision.jpeg import jpeg_size
 from flightd.vision.shelf.evidence_jpeg import picture_name
 from tests.rigs.event_loops import in_real_time
+from tests.rigs.odd_jpegs import resized
 from tests.web.served import served
 from tests.web.stock_rig import RACKS, counted_store, flown_log, picture_of
 from tests.web.test_stock_routes import NOBODY, got
@@ -150,12 +151,6 @@ def test_a_picture_that_lies_elsewhere_is_not_shown(folder: Path, what: str) -> 
         moved.symlink_to(folder.parent / "moved")
     with pytest.raises(InputError, match="was not kept"):
         stores.picture("monday", name)
-
-
-def resized(jpeg: bytes, width: int, height: int) -> bytes:
-    """The picture with another size in its frame header."""
-    at = jpeg.index(b"\xff\xc0") + 5
-    return jpeg[:at] + height.to_bytes(2, "big") + width.to_bytes(2, "big") + jpeg[at + 4 :]
 
 
 def test_a_picture_of_absurd_size_is_refused_before_it_is_decoded(folder: Path) -> None:

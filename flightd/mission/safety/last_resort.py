@@ -178,7 +178,6 @@ class LastResort:
         """At rest over the floor in place of what is level; once that ends it stays so.  A landing of the
         autopilot's own that was asked for, before or by an order, is not put off."""
         if self._by_sight_until_ns is None:
-            self._was_adopted |= last.phase is Phase.RECOVER
             lands = last.demand in {Demand.LAND, Demand.DISARM}
             self._by_sight_until_ns = 0 if lands or self._was_adopted else tick.now_ns + _BY_SIGHT_NS
         self._sinks = False

@@ -8,7 +8,6 @@ import random
 _WAVES = 3
 _LENGTHS_M = (4.0, 12.0)
 """From one rack's upright to the other side of an aisle, and across a bay of steel in the floor."""
-_BY_CHANCE_NEVER_MORE = 1.0 / _WAVES
 
 
 class SteelField:
@@ -21,7 +20,7 @@ class SteelField:
             number, course = math.tau / rng.uniform(*_LENGTHS_M), rng.uniform(0.0, math.tau)
             wave = (number * math.cos(course), number * math.sin(course), rng.uniform(0.0, math.tau))
             self._waves.append(wave)
-        self._each_rad = most_rad * _BY_CHANCE_NEVER_MORE
+        self._each_rad = most_rad / _WAVES
 
     def error_rad(self, x_m: float, y_m: float) -> float:
         """Compass minus truth at a place of the map."""

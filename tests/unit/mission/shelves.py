@@ -8,6 +8,17 @@ from flightd.core.types import CodeRead
 from flightd.mission.scan.code_assignment import FrontSight
 from flightd.site.site_file import parse_site
 
+_RACKS_AND_PAD = """
+[[rack]]
+bay_width_m = 1.3
+levels_m = [0.9, 1.8]
+positions = 2
+
+[[pad]]
+id = "home"
+node = "A1"
+size_m = 0.5
+"""
 SITE = parse_site(
     """
 [site]
@@ -20,17 +31,8 @@ x_m = 0.0
 y_m = 0.0
 spacing_m = [1.3, 1.3, 1.3]
 shelf_height_m = 2.4
-
-[[rack]]
-bay_width_m = 1.3
-levels_m = [0.9, 1.8]
-positions = 2
-
-[[pad]]
-id = "home"
-node = "A1"
-size_m = 0.5
-""",
+"""
+    + _RACKS_AND_PAD,
     "shelves",
 )
 _SPACING = "[1.3, 1.3, 1.3, 1.3]"
@@ -53,17 +55,7 @@ shelf_height_m = 2.4
         for aisle, y_m in (("A", 0.0), ("B", 3.4), ("C", 6.8))
     )
     + "".join(f'[[cross]]\nnodes = ["{a}{n}", "{b}{n}"]\n' for a, b in ("AB", "BC") for n in (1, 5))
-    + """
-[[rack]]
-bay_width_m = 1.3
-levels_m = [0.9, 1.8]
-positions = 2
-
-[[pad]]
-id = "home"
-node = "A1"
-size_m = 0.5
-""",
+    + _RACKS_AND_PAD,
     "three aisles",
 )
 """The middle aisle has no shelves before its end nodes."""

@@ -111,17 +111,14 @@ def test_the_mission_is_given_up_at_its_second_failure() -> None:
 
 
 def test_without_the_mission_it_sinks_by_sight_once_and_never_again_after_that_has_failed() -> None:
-    resort, flying = LastResort(configured().mission), TickInput(NOW_NS, vehicle=FLYING)
-    for text in ("first", "second"):
-        resort.caught(NOW_NS, ValueError(text))
+    resort, flying = given_up(), TickInput(NOW_NS, vehicle=FLYING)
     leaning = AttitudeSetpoint(NOW_NS, 0.05, climb_mps=-0.3)
-    last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, None, None)
 
     def broken() -> Sinking:
         raise ValueError("this, too")
 
     def answered(by_sight: Callable[[], Sinking | None], now_ns: int = NOW_NS) -> TickOutput:
-        return resort.answer(replace(flying, now_ns=now_ns), last, tuple, lambda: ((), ()), by_sight)
+        return resort.answer(replace(flying, now_ns=now_ns), FOLLOWS, tuple, lambda: ((), ()), by_sight)
 
     sinking = answered(lambda: Sinking(leaning, SHARED))
     assert (sinking.setpoint, sinking.demand, sinking.shared) == (leaning, Demand.KEEP, SHARED)
@@ -150,10 +147,7 @@ def test_a_landing_that_was_asked_for_and_one_found_flying_are_left_to_the_autop
 
 
 def test_sinking_by_sight_ends_by_time() -> None:
-    resort = LastResort(configured().mission)
-    last = TickOutput(None, Demand.FLY, Phase.FOLLOW, "", "A2", 1, 2, None, None)
-    for text in ("first", "second"):
-        resort.caught(NOW_NS, ValueError(text))
+    resort, last = given_up(), FOLLOWS
     demands = []
     for now_s in (1, 20, 22):
         now_ns = now_s * 10**9

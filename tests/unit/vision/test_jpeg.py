@@ -8,14 +8,9 @@ import pytest
 
 from flightd.vision.jpeg import decoded_jpeg, jpeg_size
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg
+from tests.rigs.odd_jpegs import resized
 
 GREY = evidence_jpeg(np.full((48, 64, 3), 90, np.uint8))
-
-
-def resized(jpeg: bytes, width: int, height: int) -> bytes:
-    """The picture with another size in its frame header."""
-    at = jpeg.index(b"\xff\xc0") + 5
-    return jpeg[:at] + height.to_bytes(2, "big") + width.to_bytes(2, "big") + jpeg[at + 4 :]
 
 
 def test_the_size_is_read_from_the_header() -> None:
