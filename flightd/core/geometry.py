@@ -56,6 +56,11 @@ def heading_rotation(yaw_rad: float) -> Matrix:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def yaw_rate(roll_rad: float, pitch_rad: float, pitch_radps: float, yaw_radps: float) -> float:
+    """Rate of the yaw (rad/s) from the body's rates about its y and z axes."""
+    return (pitch_radps * math.sin(roll_rad) + yaw_radps * math.cos(roll_rad)) / math.cos(pitch_rad)
+
+
 def quaternion_of(rotation: Matrix) -> tuple[float, float, float, float]:
     """The unit quaternion x y z w of a (3, 3) rotation, w not negative (Shepperd, 1978: from the largest
     of the four, so that no division is by little)."""

@@ -208,12 +208,15 @@ class CodeRead:
 
 @dataclass(frozen=True, slots=True)
 class Attitude:
-    """Body to level frame: roll + right side down, pitch + nose up, yaw + clockwise from above."""
+    """Body to level frame: roll + right side down, pitch + nose up, yaw + clockwise from above.
+
+    `yaw_rate_radps` is the rate of the yaw by the gyros alone, NaN where the vehicle tells none."""
 
     stamp_ns: int
     roll_rad: float
     pitch_rad: float
     yaw_rad: float
+    yaw_rate_radps: float = math.nan
 
 
 class LandedState(enum.StrEnum):

@@ -48,6 +48,9 @@ class Unknowns:
     """Rms of roll and pitch of each frame against the airframe."""
     compass_rad: float = 0.0
     """The most by which steel turns the compass."""
+    gyro_share: float = 0.0
+    """The most by which the gyros scale a rate."""
+    yaw_drift_radps: float = _SENSORS.yaw_drift_radps
     readout_s: float = 0.0
     map_error_m: float = 0.0
     """The most by which a painted line lies beside its place on the map."""
@@ -95,6 +98,8 @@ class Unknowns:
         return replace(
             configured,
             compass_rad=self.compass_rad,
+            gyro_share=self.gyro_share,
+            yaw_drift_radps=self.yaw_drift_radps,
             tilt_bias=self.tilt_bias_rad,
             tilt_wander_rad=self.tilt_wander_rad,
             leak_s=self.leak_s,
@@ -133,6 +138,8 @@ class Spread:
     shake_deg: float
     readout_s: float
     compass_deg: float
+    gyro_share: float
+    yaw_drift_degps: float
     map_m: float
     tilt_deg: float
     tilt_wander_deg: float
@@ -157,6 +164,8 @@ SPREADS = {
         shake_deg=0.15,
         readout_s=0.005,
         compass_deg=5.0,
+        gyro_share=0.005,
+        yaw_drift_degps=0.05,
         map_m=0.01,
         tilt_deg=0.5,
         tilt_wander_deg=0.15,
@@ -179,6 +188,8 @@ SPREADS = {
         shake_deg=0.5,
         readout_s=0.015,
         compass_deg=25.0,
+        gyro_share=0.02,
+        yaw_drift_degps=0.3,
         map_m=0.05,
         tilt_deg=0.5,
         tilt_wander_deg=1.0,
@@ -229,6 +240,8 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         baro_wander_m=most.baro_m,
         hover_share=1.0 + within(most.hover_share),
         compass_rad=math.radians(abs(within(most.compass_deg))),
+        gyro_share=most.gyro_share,
+        yaw_drift_radps=math.radians(most.yaw_drift_degps),
         readout_s=within(most.readout_s),
     )
 

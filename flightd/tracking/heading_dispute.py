@@ -9,15 +9,12 @@ from statistics import median
 
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Attitude
+from flightd.tracking.carried_heading import FASTEST_RADPS, GAP_S, LEAP_RAD
 
 _SAME_RAD = math.radians(3.0)
 _DISPUTE_NS, _SHOWN_NS = 600_000_000, 1_500_000_000
 _AT_ONCE_NS = 300_000_000
 """What turns within this time leaps: no drone turns its camera so, and no compass is led astray so fast."""
-_LEAP_RAD, _FASTEST_RADPS = math.radians(3.0), 2.0
-"""A told heading that turns by more than this between two samples leaps."""
-_GAP_S = 0.1
-"""Between samples further apart a leap does not show."""
 _SHARE = 0.5
 """Of a leap by more than this share of an error that error comes."""
 
@@ -51,9 +48,9 @@ class HeadingDispute:
         if last is None:
             return
         turn_rad, dt_s = wrap_pi(sample.yaw_rad - last.yaw_rad), (sample.stamp_ns - last.stamp_ns) * 1e-9
-        if dt_s > _GAP_S:
+        if dt_s > GAP_S:
             self._gap_ns = sample.stamp_ns
-        if abs(turn_rad) > _LEAP_RAD + _FASTEST_RADPS * max(dt_s, 0.0):
+        if abs(turn_rad) > LEAP_RAD + FASTEST_RADPS * max(dt_s, 0.0):
             self._leaps.append((sample.stamp_ns, turn_rad))
 
     def step(self, told: list[float], agreed: bool, stamp_ns: int) -> Turned | None:

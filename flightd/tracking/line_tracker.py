@@ -19,6 +19,7 @@ from flightd.core.learnt import LearntSensors
 from flightd.core.tracks import NOT_SEEN, FloorJunction, MarkerOffset, PadOffset, TrackedLine, TrackSet
 from flightd.core.types import Attitude, LineSet
 from flightd.tracking.attitude_history import AttitudeHistory
+from flightd.tracking.carried_heading import CarriedHeading
 from flightd.tracking.feature_trust import FeatureTrust
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.ground_junctions import floor_junctions
@@ -61,6 +62,8 @@ from flightd.tracking.width_heights import WidthHeights
 _STEP_NS = 20_000_000
 _FARTHEST = 3.0
 """A feature further off than so many heights is told by hardly anything."""
+_WATCHED_NS = 1_000_000_000
+"""A floor of which no frame came for longer is not watched."""
 _ASSUMED_TILT_RAD = math.radians(2.0)
 _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
@@ -118,7 +121,8 @@ class LineTracker:
         self._readout_s = readout_s
         self._params = params
         self._start_yaw_rad = start_yaw_rad
-        self._history = AttitudeHistory()
+        self._history, self._as_told = AttitudeHistory(), AttitudeHistory()
+        self._carried_heading = CarriedHeading()
         self._headed = False
         forget_ns = round(params.forget_s * 1e9)
         self._filter = FloorFilter(params.noise, params.priors, params.gate_m, forget_ns, latency_s)
@@ -140,8 +144,8 @@ class LineTracker:
 
     @property
     def heading_error_rad(self) -> float:
-        """What all lines lately said against the vehicle's heading; 0 while any of them agrees."""
-        return self._dispute.error_rad
+        """What all lines, or the gyros, lately said against the vehicle's heading; 0 while they agree."""
+        return self._dispute.error_rad or -self._carried_heading.leap_rad
 
     @property
     def height_share(self) -> float:
@@ -185,18 +189,24 @@ class LineTracker:
 
     def assume(self, samples: Iterable[Attitude]) -> None:
         """Take what is assumed of the attitude from the newest sample on, in the place of what was."""
-        self._history.assume(samples)
+        lead_rad = self._carried_heading.lead_rad
+        self._history.assume(
+            replace(sample, yaw_rad=wrap_pi(sample.yaw_rad + lead_rad)) for sample in samples
+        )
 
     def measured(self, lines: LineSet) -> bool:
         """Whether the attitude at the frame's exposure has been told."""
         return self.exposed_ns(lines) <= self._history.measured_ns
 
     def attitude(self, sample: Attitude) -> None:
-        self._history.add(sample)
-        self._dispute.told(sample)
+        """Take a sample of telemetry."""
+        carried = self._carried_heading.take(sample, watched=sample.stamp_ns - self._stamp_ns < _WATCHED_NS)
+        self._as_told.add(sample)
+        self._history.add(carried)
+        self._dispute.told(carried)
         if not self._headed:
             self._headed = True
-            offset = wrap_pi(self._start_yaw_rad - sample.yaw_rad)
+            offset = wrap_pi(self._start_yaw_rad - carried.yaw_rad)
             self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
 
     def exposed_ns(self, lines: LineSet) -> int:
@@ -266,8 +276,8 @@ class LineTracker:
     def exposure_motion(self, now_ns: int) -> ExposureMotion | None:
         """What the newest frame tells of the motion; None where it was laid over an attitude that was only
         assumed, or lines contradict the heading."""
-        told, held = self._seen_in, self._filter
-        if told is None or self._stamp_ns == 0 or self._dispute.error_rad:
+        seen_in, held, told = self._seen_in, self._filter, self._as_told.at(self._stamp_ns)
+        if seen_in is None or told is None or self._stamp_ns == 0 or self.heading_error_rad:
             return None
         by_lines = held.speeds(self._stamp_ns)
         variances = [
@@ -278,7 +288,7 @@ class LineTracker:
         ]
         return ExposureMotion(
             replace(told, stamp_ns=self._stamp_ns),
-            wrap_pi(told.yaw_rad + held.mean(PSI)),
+            wrap_pi(seen_in.yaw_rad + held.mean(PSI)),
             (held.mean(VX), held.mean(VY)),
             (variances[0], variances[1]),
             self._carried_to(now_ns)[2:4],

@@ -84,9 +84,7 @@ class Instruments:
             sensors.roll_rad,
             sensors.pitch_rad,
             sensors.noisy_yaw_rad(),
-            airframe.roll_speed_radps,
-            airframe.pitch_speed_radps,
-            airframe.yaw_speed_radps,
+            *sensors.body_rates_radps(airframe.kinematics(0)),
         )
 
     def _distance(self) -> Message:

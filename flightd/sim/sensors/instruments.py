@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.plant.airframe import Airframe
+from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.steel_field import SteelField
 
 
@@ -21,6 +22,9 @@ class SensorParams:
     heading_offset_rad: float = 0.7
     yaw_drift_radps: float = math.radians(0.03)
     yaw_noise_rad: float = math.radians(0.1)
+    gyro_noise_radps: float = math.radians(0.3)
+    gyro_share: float = 0.0
+    """The most by which a gyro tells a rate too large or too small, as a share of it."""
     compass_rad: float = 0.0
     """The most by which steel turns the compass at any place."""
     compass_s: float = 5.0
@@ -86,6 +90,8 @@ class Sensors:
         self._bent_rad: float | None = None
         self._yaw_drift = rng.uniform(-p.yaw_drift_radps, p.yaw_drift_radps)
         self._yaw_error = p.heading_offset_rad
+        self._gyro_rng = gyros = random.Random(f"gyros {seed}")
+        self._gyro_scale = 1.0 + gyros.uniform(-p.gyro_share, p.gyro_share)
         self._roll_wander = self._pitch_wander = self._baro_wander = self._climb_error = 0.0
         self.roll_rad = self.pitch_rad = self.yaw_rad = 0.0
         self.height_m = self.climb_mps = 0.0
@@ -160,6 +166,16 @@ class Sensors:
         part = dt_s / leak_s
         self._roll_leak -= part * (airframe.roll_rad + self._roll_leak - felt_roll)
         self._pitch_leak -= part * (airframe.pitch_rad + self._pitch_leak - felt_pitch)
+
+    def body_rates_radps(self, truth: Kinematics) -> tuple[float, float, float]:
+        """What the gyros feel about the body's axes; that of the yaw has the bias by which the heading
+        drifts."""
+        gauss, scale, noise = self._gyro_rng.gauss, self._gyro_scale, self.params.gyro_noise_radps
+        roll, pitch, yaw = (
+            scale * rate + gauss(0.0, noise)
+            for rate in (truth.roll_rate_radps, truth.pitch_rate_radps, truth.yaw_rate_radps)
+        )
+        return roll, pitch, yaw + self._yaw_drift
 
     def noisy_yaw_rad(self) -> float:
         """The yaw estimate as a telemetry sample: with its noise."""

@@ -170,6 +170,7 @@ def test_a_landed_state_is_believed_for_a_second() -> None:
     assert readings.landed(6 + 10**9) is LandedState.UNKNOWN
 
 
+_ATTITUDE = ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
 _RANGED = {
     "id": 0,
     "orientation": 25,
@@ -202,9 +203,8 @@ def test_attitudes_keep_their_time_when_boot_times_begin_anew_after_49_days() ->
     for now_ns in range(0, 6_000 * ms, 100 * ms):
         asked = sync.ask(now_ns)
         assert sync.answered(asked, asked - boot_ns, asked + 2 * ms)
-        told_us = (now_ns - boot_ns) // ms % wrap_ms * 1000
-        angles = SimpleNamespace(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0, timestamp_us=told_us)
-        readings.take_attitude(angles, now_ns + late_ns)
+        angles = dict.fromkeys(_ATTITUDE, 0.0) | {"time_boot_ms": (now_ns - boot_ns) // ms % wrap_ms}
+        readings.take_attitude(json.dumps(angles), now_ns + late_ns)
         (attitude,) = readings.attitudes()
         assert attitude.stamp_ns == pytest.approx(now_ns, abs=2 * ms)
 
@@ -219,13 +219,12 @@ def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_be
             return SimpleNamespace(**{name: rng.choice(odd) for name in names})
 
         whole = rng.choice([value for value in odd if isinstance(value, int)])
-        angles = some("roll_deg", "pitch_deg", "yaw_deg")
-        angles.timestamp_us = whole
+        angles = {name: rng.choice([*odd, None]) for name in _ATTITUDE} | {"time_boot_ms": whole}
         ranged = {name: rng.choice([*odd, 25, None]) for name in _RANGED}
         readings.take_mode(whole, now_ns)
         readings.take_landed(whole, now_ns)
         readings.take_armed(bool(whole), now_ns)
-        readings.take_attitude(angles, now_ns)
+        readings.take_attitude(json.dumps(angles), now_ns)
         readings.take_range(json.dumps(ranged), now_ns)
         readings.take_velocity(SimpleNamespace(velocity=some("down_m_s")), now_ns)
         readings.take_battery(some("id", "voltage_v", "remaining_percent"), now_ns)

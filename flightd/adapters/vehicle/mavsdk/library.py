@@ -7,6 +7,7 @@ import contextlib
 import functools
 import json
 import logging
+import math
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
@@ -58,6 +59,15 @@ def whole_fields(document: str, *names: str) -> tuple[int, ...] | None:
     try:
         fields = json.loads(document)
         return tuple(int(fields[name]) for name in names)
+    except (ValueError, TypeError, KeyError, OverflowError):
+        return None
+
+
+def real_fields(document: str, *names: str) -> tuple[float, ...] | None:
+    """Numbers out of such a message, NaN where it has none; None if one is missing."""
+    try:
+        fields = json.loads(document)
+        return tuple(math.nan if fields[name] is None else float(fields[name]) for name in names)
     except (ValueError, TypeError, KeyError, OverflowError):
         return None
 

@@ -12,12 +12,14 @@ from mavsdk.plugins.telemetry import LandedState as SdkLanded
 
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.telemetry import cells_of, range_sample
-from flightd.adapters.vehicle.mavsdk.library import whole_fields
+from flightd.adapters.vehicle.mavsdk.library import real_fields, whole_fields
 from flightd.adapters.vehicle.newest_readings import REBOOT_MS, NewestReadings, has_rebooted
+from flightd.core.geometry import yaw_rate
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _CLIMB_STALE_NS = 500_000_000
+_ATTITUDE_FIELDS = ("roll", "pitch", "yaw", "pitchspeed", "yawspeed")
 _RANGE_FIELDS = ("id", "orientation", "current_distance", "min_distance", "max_distance")
 
 _MODES = {int(mode): mode for mode in FlightMode}
@@ -53,12 +55,12 @@ class MavsdkTelemetry(NewestReadings):
         """The library passes the flight mode on with every HEARTBEAT; one it has no name for is unknown."""
         self.mode, self.heartbeat_ns = _MODES.get(mode, FlightMode.UNKNOWN), now_ns
 
-    def take_attitude(self, angles: Any, now_ns: int) -> None:
-        """An EulerAngle, degrees."""
-        degrees = (angles.roll_deg, angles.pitch_deg, angles.yaw_deg)
-        if not all(abs(angle) <= 360.0 for angle in degrees):  # NaN fails too
-            return
-        boot_ms = int(angles.timestamp_us) // 1000
+    def take_attitude(self, document: str, now_ns: int) -> None:
+        """The fields of an ATTITUDE as they came: the library parts the rates from the angles."""
+        boot, told = whole_fields(document, "time_boot_ms"), real_fields(document, *_ATTITUDE_FIELDS)
+        if boot is None or told is None or not all(abs(angle) <= math.tau for angle in told[:3]):
+            return  # NaN too
+        (boot_ms,), (roll, pitch, yaw, *rates) = boot, told
         rebooted = has_rebooted(boot_ms, self._boot_ms)
         if rebooted:
             self._sync.reset()
@@ -69,7 +71,7 @@ class MavsdkTelemetry(NewestReadings):
         if self._attitude is not None and not rebooted:
             in_order = in_order and stamp_ns > self._attitude.stamp_ns
         if in_order:
-            self._attitude = Attitude(stamp_ns, *map(math.radians, degrees))
+            self._attitude = Attitude(stamp_ns, roll, pitch, yaw, yaw_rate(roll, pitch, *rates))
             self._attitudes.append(self._attitude)
 
     def take_range(self, document: str, now_ns: int) -> None:

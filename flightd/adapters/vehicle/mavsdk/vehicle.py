@@ -237,7 +237,11 @@ class MavsdkVehicle:
         sources: list[tuple[AsyncIterator[Any], int | None, Callable[[Any, int], None]]] = [
             (telemetry.subscribe_flight_mode(), dialect.MAVLINK_MSG_ID_HEARTBEAT, self._beat),
             (telemetry.subscribe_armed(), None, readings.take_armed),
-            (telemetry.subscribe_attitude_euler(), dialect.MAVLINK_MSG_ID_ATTITUDE, readings.take_attitude),
+            (
+                plugins.direct.subscribe_message("ATTITUDE"),
+                dialect.MAVLINK_MSG_ID_ATTITUDE,
+                self._take_attitude,
+            ),
             (
                 telemetry.subscribe_position_velocity_ned(),
                 dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
@@ -297,6 +301,10 @@ class MavsdkVehicle:
         fields = whole_fields(message.fields_json, "tc1", "ts1")
         if fields is not None and fields[0] != 0:
             self._sync.answered(fields[1], fields[0], now_ns)
+
+    def _take_attitude(self, message: Any, now_ns: int) -> None:
+        if message.system_id == self._system_id and message.component_id == 1:
+            self._readings.take_attitude(message.fields_json, now_ns)
 
     def _take_range(self, message: Any, now_ns: int) -> None:
         if message.system_id == self._system_id:
