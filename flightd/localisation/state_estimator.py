@@ -27,9 +27,11 @@ from flightd.tracking.stuck_height import StuckHeight
 
 _LATE_GAIN, _MOST_LATE_S = 0.02, 0.15
 """How soon the usual delay of attitudes is believed, and the most of it."""
-_FREE_S, _LEAST_EASE = 0.15, 0.5
+_FREE_S, _LEAST_EASE = 0.15, 0.35
 """The configured gains are for a loop that is no later than this, beside the attitude's own; a later one
 answers more slowly in proportion, down to this share."""
+_ATTITUDE_LAG_S = 0.2
+"""Of an attitude loop of 10 rad/s, for which the gains are."""
 _UNLEANT_S = 0.3
 """Over so long a push is averaged before it is leant against."""
 _MAP_SIGMA_M = 0.02
@@ -147,6 +149,8 @@ class StateEstimator:
         self.tracker.assume(self.response.foreseen(tick.now_ns))
         if tick.vehicle is not None:
             v = tick.vehicle
+            if not v.armed:
+                self.tracker.stand()
             if not self._stuck.found:
                 self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
             self._count_climb(tick.now_ns, v.climb_mps)
@@ -250,8 +254,12 @@ class StateEstimator:
             return CALM
         late_s = min(max((now_ns - seen_ns) * 1e-9, 0.0), _MOST_LATE_S)
         self._frames_s += _LATE_GAIN * (late_s - self._frames_s)
+        slower_s = max(2.0 / response.bandwidth_radps - _ATTITUDE_LAG_S, 0.0)
         total_s = (
-            self._frames_s + response.delay_s + math.hypot(response.delay_sigma_s, tracker.delay_sigma_s)
+            slower_s
+            + self._frames_s
+            + response.delay_s
+            + math.hypot(response.delay_sigma_s, tracker.delay_sigma_s)
         )
         part = TICK_S / _UNLEANT_S
         x, y = self._unleant

@@ -217,6 +217,10 @@ class FloorFilter:
         self._begin_anew([MOUNT_YAW])
         self._x[MOUNT_YAW] = turned_rad
 
+    def stand(self) -> None:
+        """The drone stands, or has hardly risen: it moves as little as at first, whatever it leans."""
+        self._begin_anew([VX, VY, PUSH_X, PUSH_Y])
+
     def forget(self) -> None:
         """Know no line and no motion any more; what was learnt of the sensors stays."""
         self._drop(range(len(self.held)))

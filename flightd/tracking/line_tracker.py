@@ -129,7 +129,7 @@ class LineTracker:
         if learnt is not None:
             self._filter.begin_with(learnt)
         self._forget_ns = forget_ns
-        self._lines_ns = 0
+        self._lines_ns, self._stands = 0, True
         self._features_ns = [0, 0]
         self._trust = FeatureTrust()
         self._stamp_ns = self._told_ns = 0
@@ -209,6 +209,11 @@ class LineTracker:
             offset = wrap_pi(self._start_yaw_rad - carried.yaw_rad)
             self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
 
+    def stand(self) -> None:
+        """The motors do not turn: until lines are seen again the drone stands, or has hardly risen, and leans
+        that are told move it nowhere."""
+        self._stands = True
+
     def exposed_ns(self, lines: LineSet) -> int:
         """When the frame was exposed, by what has been learnt of the camera's delay."""
         return lines.stamp_ns + round(self._filter.mean(DELAY) * 1e9)
@@ -259,7 +264,7 @@ class LineTracker:
         self._markers = tuple(MarkerOffset(mark.id, x, y, side) for mark, x, y, side in marks)
         self._junctions = floor_junctions(lines.junctions, view, yaw)
         if sights:
-            self._lines_ns = stamp_ns
+            self._lines_ns, self._stands = stamp_ns, False
         return True
 
     def _as_of_one_moment(
@@ -357,6 +362,8 @@ class LineTracker:
     def _carried_to(self, now_ns: int) -> tuple[float, float, float, float, float, float]:
         """The same from the newest frame on; a longer blindness than is remembered is not bridged by
         prediction."""
+        if self._stands:
+            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         since_ns = max(self._stamp_ns, now_ns - self._forget_ns)
         return self._carried(since_ns, now_ns, self._filter.mean(VX), self._filter.mean(VY))
 
@@ -422,6 +429,8 @@ class LineTracker:
                 told = self._attitude_at(self._stamp_ns + step_ns // 2)
                 self._filter.predict(step_ns * 1e-9, told.roll_rad, told.pitch_rad, told.yaw_rad)
                 self._stamp_ns += step_ns
+            if self._stands:
+                self._filter.stand()
         self._stamp_ns = max(stamp_ns, self._stamp_ns)
 
     def _attitude_at(self, stamp_ns: int) -> Attitude:

@@ -71,7 +71,8 @@ def test_attitudes_come_once_in_order_with_the_time_at_which_they_were_true(on_r
             return float(sum((o - mean) ** 2 for o in offsets))
 
         best_ms = min(range(-20, 21), key=lambda ms: error(ms * 1_000_000))
-        assert abs(best_ms) <= 4
+        # threads of a library beside a loop that pauses with the machine see the pauses
+        assert abs(best_ms) <= (4 if not rig.late_s else 15)
 
     on_rig(test)
 
@@ -124,6 +125,11 @@ def test_the_yaw_rate_turns_clockwise_and_zero_holds_the_heading(on_rig: Any) ->
             await rig.stream(4.0, yaw_rate_radps=math.radians(rate_deg))
             turned = wrap_pi(rig.peer.truth().yaw_rad - start)
             assert math.degrees(turned) == pytest.approx(4.0 * rate_deg, abs=4.0)
+            felt_radps = rig.known().attitude.yaw_rate_radps
+            if rig.tells_rates:
+                assert math.degrees(felt_radps) == pytest.approx(rate_deg, abs=2.0)
+            else:
+                assert math.isnan(felt_radps)
             await rig.stream(1.0)
             held = rig.peer.truth().yaw_rad
             await rig.stream(2.0)

@@ -59,6 +59,8 @@ class Rig:
     """A radio gap after which the vehicle still obeys."""
     late_s: float = 0.0
     """How much later than by its own code it may come, on a busy machine, by a library's own clock."""
+    tells_rates: bool = True
+    """Whether the vehicle tells what its gyros feel."""
     has_pilot: bool = True
     """Whether someone besides us can command it: an AR.Drone has one client only."""
     texts: Callable[[], list[str] | None] = lambda: None
@@ -166,7 +168,17 @@ async def ardrone_rig(**settings: Any) -> AsyncIterator[Rig]:
             server.radio = not apart
 
         rate = 200.0 if settings.get("full_navdata") else 15.0
-        rig = Rig(vehicle, server, lambda: None, cut, rate, alone_s=1.5, gap_s=1.5, has_pilot=False)
+        rig = Rig(
+            vehicle,
+            server,
+            lambda: None,
+            cut,
+            rate,
+            alone_s=1.5,
+            gap_s=1.5,
+            tells_rates=False,
+            has_pilot=False,
+        )
         rig.flying_task = asyncio.create_task(vehicle.run(), name="vehicle")
         tasks = [rig.flying_task, asyncio.create_task(server.run(), name="peer")]
         try:
