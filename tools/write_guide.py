@@ -23,7 +23,7 @@ from flightd.config.schema import Config
 from flightd.guide import pages
 from flightd.mission.safety import hazard_table
 from flightd.sim.judge.verdict import KINDS
-from flightd.sim.unknowns import SPREADS, UNEVEN, WorldKind
+from flightd.sim.unknowns import SPREADS, WorldKind
 from flightd.site.site_tables import SiteFile
 from tools import command_table, reference_tables, safety_case
 from tools.command_help import help_pages
@@ -83,13 +83,17 @@ def _worlds() -> str:
         ("attitude: error that wanders, rms", "tilt_wander_deg", 1, "deg"),
         ("attitude: leaks to level within", "leak_s", 1, "s"),
         ("autopilot's clock fast or slow by up to", "clock_ppm", 1, "ppm"),
-        (f"telemetry: least delay, either way up to {UNEVEN * 100:g} % longer", "path_s", 1e3, "ms"),
+        ("gyros: yaw rate off for good by up to", "yaw_drift_degps", 1, "deg/s"),
+        ("gyros: rates too large or small by up to", "gyro_share", 1e2, "%"),
+        ("telemetry: least delay of either way", "path_s", 1e3, "ms"),
+        ("telemetry: one way longer, the other shorter by up to", "uneven_s", 1e3, "ms"),
         ("telemetry: jitter, exponential", "path_jitter_s", 1e3, "ms"),
         ("range finder: noise, rms", "range_noise_m", 1e2, "cm"),
         ("range finder: readings lost", "range_dropout", 1e2, "%"),
         ("range finder: measures from", "range_min_m", 1, "m"),
         ("barometer: wanders, rms", "baro_m", 1, "m"),
         ("hover thrust off by up to", "hover_share", 1e2, "%"),
+        ("air: gusts, rms", "gust_mps", 1, "m/s"),
     )
     lines += [
         f"| {what} | {getattr(usual, name) * factor:g} {unit} | {getattr(rough, name) * factor:g} {unit} |"

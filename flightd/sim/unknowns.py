@@ -17,6 +17,7 @@ from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.floor.misplaced_lines import misplaced
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.wind import WindParams
 from flightd.sim.sensors.instruments import SensorParams
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.site import Site
@@ -31,6 +32,7 @@ class WorldKind(enum.StrEnum):
 
 
 _SENSORS = SensorParams()
+_GUST_RMS_MPS = WindParams().gust_rms_mps
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +70,7 @@ class Unknowns:
     range_min_m: float = _SENSORS.range_min_m
     baro_wander_m: float = _SENSORS.baro_wander_m
     hover_share: float = 1.0
+    gust_rms_mps: float = _GUST_RMS_MPS
 
     def camera(self, configured: SimCamera) -> SimCamera:
         """The down camera as it really is."""
@@ -117,6 +120,10 @@ class Unknowns:
         down = RadioParams(delay_s=down_s, jitter_s=self.path_jitter_s, in_order=True)
         return down, replace(down, delay_s=up_s)
 
+    def wind(self, configured: WindParams, *, told: bool) -> WindParams:
+        """The air of the hall; gusts that somebody has `told` are as they are."""
+        return configured if told else replace(configured, gust_rms_mps=self.gust_rms_mps)
+
     def airframe(self, configured: AirframeParams) -> AirframeParams:
         """The airframe as it really is."""
         return replace(configured, hover_collective=configured.hover_collective * self.hover_share)
@@ -146,12 +153,14 @@ class Spread:
     leak_s: float
     clock_ppm: float
     path_s: float
+    uneven_s: float
     path_jitter_s: float
     range_noise_m: float
     range_dropout: float
     range_min_m: float
     baro_m: float
     hover_share: float
+    gust_mps: float
 
 
 SPREADS = {
@@ -172,12 +181,14 @@ SPREADS = {
         leak_s=6.0,
         clock_ppm=50.0,
         path_s=0.010,
+        uneven_s=0.003,
         path_jitter_s=0.005,
         range_noise_m=0.010,
         range_dropout=0.01,
         range_min_m=0.10,
         baro_m=0.1,
         hover_share=0.10,
+        gust_mps=_GUST_RMS_MPS,
     ),
     WorldKind.ROUGH: Spread(
         delay_s=0.050,
@@ -195,17 +206,17 @@ SPREADS = {
         tilt_wander_deg=1.0,
         leak_s=2.0,
         clock_ppm=20_000.0,
-        path_s=0.060,
-        path_jitter_s=0.030,
+        path_s=0.026,
+        uneven_s=0.018,
+        path_jitter_s=0.020,
         range_noise_m=0.04,
         range_dropout=0.08,
         range_min_m=0.30,
         baro_m=0.4,
         hover_share=0.25,
+        gust_mps=0.5,
     ),
 }
-UNEVEN = 0.3
-"""Share of the path's delay by which one way may be longer than the other."""
 
 
 def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
@@ -217,7 +228,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
 
-    uneven_s = within(UNEVEN * most.path_s)
+    uneven_s = within(most.uneven_s)
     return Unknowns(
         kind=kind,
         camera_delay_s=within(most.delay_s),
@@ -243,6 +254,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         gyro_share=most.gyro_share,
         yaw_drift_radps=math.radians(most.yaw_drift_degps),
         readout_s=within(most.readout_s),
+        gust_rms_mps=most.gust_mps,
     )
 
 

@@ -85,7 +85,7 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         camera=replace(scenario.camera.camera(), mount=config.camera.mount()),
         front=_front(simulation, ports.front_camera),
         appearance=scenario.floor.surface(),
-        wind=scenario.wind.params(),
+        wind=simulation.unknowns.wind(scenario.wind.params(), told=scenario.wind.tells_gusts),
         battery_frac=scenario.vehicle.battery,
         battery_ah=scenario.vehicle.battery_ah,
         swap_s=scenario.vehicle.swap_s,

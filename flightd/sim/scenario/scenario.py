@@ -198,6 +198,11 @@ class WindScenario(Section):
     mean_y_mps: float = Field(0.0, ge=-10, le=10)
     gust_mps: float = Field(WindParams().gust_rms_mps, ge=0, le=10)
 
+    @property
+    def tells_gusts(self) -> bool:
+        """Whether the scenario says how strong the gusts are; else the world does."""
+        return "gust_mps" in self.model_fields_set
+
     def params(self) -> WindParams:
         return WindParams(self.mean_x_mps, self.mean_y_mps, self.gust_mps)
 

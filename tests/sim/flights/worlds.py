@@ -27,7 +27,6 @@ from flightd.site.site import Site
 from flightd.site.site_file import load_site
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight, rms_off_line
 
-_GUST_MPS = 0.3
 _LONGEST_S = 900.0
 
 
@@ -73,8 +72,8 @@ def flown_ideally(world: WorldKind, seed: int, nodes: str) -> Result:
     """One flight by computed sight, with that world's sensors and link."""
     config, site = load_config(shipped("sim.toml")), load_site(shipped("site-demo.toml"))
     visits = tuple(nodes.split(",")) if nodes else ()
-    wind, unknowns = WindParams(gust_rms_mps=_GUST_MPS), unknowns_of(world, seed)
-    painted = unknowns.floor(site, seed)
+    unknowns = unknowns_of(world, seed)
+    wind, painted = unknowns.wind(WindParams(), told=False), unknowns.floor(site, seed)
     flight = IdealFlight(site, config, visits=visits, seed=seed, wind=wind, unknowns=unknowns, world=painted)
     flown = flight.fly(_LONGEST_S)
     end, pad = flown.truth[-1][1], site.nodes[site.home.node]
