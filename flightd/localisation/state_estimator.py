@@ -30,6 +30,8 @@ _LATE_GAIN, _MOST_LATE_S = 0.02, 0.15
 _FREE_S, _LEAST_EASE = 0.15, 0.35
 """The configured gains are for a loop that is no later than this, beside the attitude's own; a later one
 answers more slowly in proportion, down to this share."""
+_JITTERS = 4.0
+"""What comes from the vehicle errs by twice its mean deviation now and then; what goes there by as much."""
 _ATTITUDE_LAG_S = 0.2
 """Of an attitude loop of 10 rad/s, for which the gains are."""
 _UNLEANT_S = 0.3
@@ -83,7 +85,7 @@ class StateEstimator:
         self._least_integrity = least_integrity
         self._heights = HeightHistory()
         self.response = AttitudeResponse()
-        self._telemetry_s = 0.0
+        self._telemetry_s = self._jitter_s = 0.0
         self._attitude_ns = 0
         self._obeys = False
         self.frames = FrameMonitor()
@@ -140,8 +142,9 @@ class StateEstimator:
         obeys = self._obeys_now(tick)
         self.response.sent(tick.now_ns, commanded if obeys else None)
         for sample in tick.attitudes:
-            late_s = (tick.now_ns - sample.stamp_ns) * 1e-9
-            self._telemetry_s += _LATE_GAIN * (min(max(late_s, 0.0), _MOST_LATE_S) - self._telemetry_s)
+            late_s = min(max((tick.now_ns - sample.stamp_ns) * 1e-9, 0.0), _MOST_LATE_S)
+            self._jitter_s += _LATE_GAIN * (abs(late_s - self._telemetry_s) - self._jitter_s)
+            self._telemetry_s += _LATE_GAIN * (late_s - self._telemetry_s)
             self._attitude_ns = sample.stamp_ns
             self.tracker.attitude(sample)
             self.poses.add_attitude(sample)
@@ -255,12 +258,8 @@ class StateEstimator:
         late_s = min(max((now_ns - seen_ns) * 1e-9, 0.0), _MOST_LATE_S)
         self._frames_s += _LATE_GAIN * (late_s - self._frames_s)
         slower_s = max(2.0 / response.bandwidth_radps - _ATTITUDE_LAG_S, 0.0)
-        total_s = (
-            slower_s
-            + self._frames_s
-            + response.delay_s
-            + math.hypot(response.delay_sigma_s, tracker.delay_sigma_s)
-        )
+        unsure_s = math.hypot(response.delay_sigma_s, tracker.delay_sigma_s) + _JITTERS * self._jitter_s
+        total_s = self._frames_s + response.delay_s + slower_s + unsure_s
         part = TICK_S / _UNLEANT_S
         x, y = self._unleant
         now_x, now_y = tracker.unleant(now_ns)

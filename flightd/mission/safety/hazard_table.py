@@ -169,16 +169,16 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "attitude_wrong",
         Trigger.ATTITUDE_WRONG,
-        "heading by the lines against the vehicle's by more than `hazards.heading_deg` for"
-        " `hazards.disagree_s`",
+        "heading by the lines, or a leap of the told heading that the gyros did not feel, against the"
+        " vehicle's by more than `hazards.heading_deg` for `hazards.disagree_s`",
         Action.LAND,
-        "the heading is taken from the lines; land by them",
+        "the heading is carried by the gyros and taken from the lines; land by them",
         _FAST,
     ),
     Hazard(
         "camera_turned",
         Trigger.ATTITUDE_WRONG,
-        "the same, where the picture leapt and the told heading did not",
+        "heading by the lines against it, where the picture leapt and the heading did not",
         Action.LAND,
         "the camera is taken to be turned in its mount by so much; land by the lines",
         "tests/sim/hazards/test_lasting_faults.py",

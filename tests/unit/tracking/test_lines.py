@@ -101,3 +101,31 @@ def test_a_line_of_another_width_is_not_paint() -> None:
     assert tracks is not None
     assert not tracks.across_y
     assert tracks.lines_ns == 0
+
+
+def test_before_a_line_is_seen_a_lean_that_is_told_moves_nothing() -> None:
+    """A drone on its pad whose told attitude is off was believed to slide away, and leant against it."""
+    tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0)
+    for i in range(1, 90):
+        tracker.attitude(Attitude(i * FRAME_NS, math.radians(2.0), 0.0, 0.0))
+        tracker.frame(LineSet(i, i * FRAME_NS, 640, 360, (), (), "ideal"), HEIGHT_M)
+    tracks = tracker.at(89 * FRAME_NS + LATE_NS)
+    assert tracks is not None
+    assert (tracks.vx_mps, tracks.vy_mps) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("rates", [True, False])
+def test_a_compass_that_steel_bends_turns_the_heading_only_where_no_gyro_tells(rates: bool) -> None:
+    """No line in sight, so nothing else says how the drone heads."""
+    tracker, _, now_ns = flown(0.0, 1.0)
+    for i in range(1, 60):
+        at_ns = now_ns + i * FRAME_NS
+        felt_radps = 1e-4 * math.sin(i) if rates else math.nan
+        tracker.attitude(Attitude(at_ns, 0.0, 0.0, math.radians(0.3 * i), felt_radps))
+        tracker.frame(LineSet(99 + i, at_ns, 640, 360, (), (), "ideal"), HEIGHT_M)
+    tracks = tracker.at(now_ns + 59 * FRAME_NS)
+    assert tracks is not None
+    assert math.degrees(tracks.yaw_rad) == pytest.approx(0.0 if rates else 17.7, abs=0.7)
+    motion = tracker.exposure_motion(now_ns + 59 * FRAME_NS)
+    assert motion is not None
+    assert math.degrees(motion.attitude.yaw_rad) == pytest.approx(17.7, abs=0.3), "the vehicle's own, as told"
