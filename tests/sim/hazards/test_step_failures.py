@@ -262,7 +262,7 @@ class Broken:
 
 def test_whoever_fails_at_being_told_ends_no_flight_and_is_named_once() -> None:
     display, kept = Broken(), list[tuple[str, Any]]()
-    flight = scan_flight(("A2",), site=ONE_SIDED, observers=[display])
+    flight = scan_flight(("A3",), site=ONE_SIDED, observers=[display])
     flight.on_record = lambda topic, _stamp_ns, message: kept.append((topic, message))
     assert flight.fly(120.0).phase is Phase.DONE
     assert display.told > 100
