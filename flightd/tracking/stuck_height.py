@@ -77,27 +77,31 @@ class StuckHeight:
         moved_m = max(new.climbed_m - self._least_climbed_m, self._most_climbed_m - new.climbed_m)
         return moved_m > _MOVED_M or new.wanted_m - self._least_wanted_m > _WANTED_M
 
-    def _unseen_m(self, old: _Sample) -> float:
-        """What may have been climbed since then before the range finder measured anything."""
+    def _unseen_m(self) -> float:
+        """What may have been climbed from where it stood before the range finder measured anything."""
         first_m, (least_m, most_m) = self._first_m, _UNMEASURED_M
-        standing = first_m is not None and abs(old.height_m - first_m) < _STANDING_M
-        return min(first_m, most_m) if first_m is not None and first_m > least_m and standing else 0.0
+        return min(first_m, most_m) if first_m is not None and first_m > least_m else 0.0
 
     def _contradicts(self, new: _Sample) -> bool:
         if not self._rose(new):
             return False
-        stands_still, drop_m, later = True, 0.0, new
-        for old in reversed(self._samples):
-            age_ns = new.stamp_ns - old.stamp_ns
-            rose_m = new.height_m - old.height_m
-            climbed_m = new.climbed_m - old.climbed_m - self._unseen_m(old)
-            drop_m, later = min(drop_m, later.height_m - old.height_m), old
-            followed_m = max(rose_m - drop_m, 0.0)  # one drop may be goods that came below
-            stands_still = stands_still and abs(rose_m) < _SHARE * _MOVED_M
-            if stands_still and age_ns <= _WINDOW_NS and abs(climbed_m) > _MOVED_M:
-                return True
+        unseen_m, first_m = self._unseen_m(), self._first_m
+        new_ns, new_m, new_climbed_m, new_wanted_m = new
+        stands_still, drop_m, later_m = True, 0.0, new_m
+        for old_ns, old_m, old_climbed_m, old_wanted_m in reversed(self._samples):
+            age_ns = new_ns - old_ns
+            rose_m = new_m - old_m
+            climbed_m = new_climbed_m - old_climbed_m
+            if unseen_m and first_m is not None and abs(old_m - first_m) < _STANDING_M:
+                climbed_m -= unseen_m
+            drop_m, later_m = min(drop_m, later_m - old_m), old_m
+            followed_m = rose_m - drop_m if rose_m > drop_m else 0.0  # one drop may be goods that came below
+            if stands_still:
+                stands_still = abs(rose_m) < _SHARE * _MOVED_M
+                if stands_still and age_ns <= _WINDOW_NS and abs(climbed_m) > _MOVED_M:
+                    return True
             if age_ns <= _AHEAD_NS and climbed_m - followed_m > _AHEAD_M:
                 return True
-            if new.wanted_m - old.wanted_m - followed_m > _WANTED_M:
+            if new_wanted_m - old_wanted_m - followed_m > _WANTED_M:
                 return True
         return False

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,6 +53,26 @@ class FloorView:
     sigma_tilt_rad: float
 
 
+class _Camera(NamedTuple):
+    """How a tilted camera maps the floor; all that looks at one frame shares it, so nothing changes it."""
+
+    homography: Matrix
+    """`ground_homography`."""
+    inverse: Matrix
+    lever_m: Matrix
+    """(forward, right, down) of the camera from the body, level frame."""
+
+
+@lru_cache(maxsize=4)
+def _camera(lens: Lens, mount: Mount, roll_rad: float, pitch_rad: float) -> _Camera:
+    homography = ground_homography(lens, mount, roll_rad, pitch_rad)
+    inverse: Matrix = np.asarray(np.linalg.inv(homography), dtype=np.float64)
+    lever_m: Matrix = np.asarray(
+        level_from_body(roll_rad, pitch_rad) @ np.array(mount.offset_m), dtype=np.float64
+    )
+    return _Camera(homography, inverse, lever_m)
+
+
 def ground_point(x_px: float, y_px: float, view: FloorView) -> tuple[float, float, float] | None:
     """(forward, right) in metres of a point of the floor seen at centred image coordinates, level frame of
     the body, and metres per pixel there; None for what the view cannot place.  Always the exact form."""
@@ -76,12 +98,10 @@ def ground_lines(lines: Sequence[Line], view: FloorView) -> list[GroundLine]:
         return []
     if view.compensation is not TiltCompensation.EXACT:
         roll = pitch = 0.0
-    lever: Matrix = np.asarray(level_from_body(roll, pitch) @ np.array(view.mount.offset_m), dtype=np.float64)
+    homography, inverse, lever = _camera(view.lens, view.mount, roll, pitch)
     camera_height_m = view.height_m - float(lever[2])
     if not camera_height_m > 0.02:
         return []
-    homography = ground_homography(view.lens, view.mount, roll, pitch)
-    inverse: Matrix = np.asarray(np.linalg.inv(homography), dtype=np.float64)
     centre = view.lens.centre_px
     placed = (_place(line, view, homography, inverse, centre, camera_height_m, lever) for line in lines)
     return [line for line in placed if line is not None]
@@ -141,18 +161,18 @@ def heights_by_width(lines: Sequence[Line], view: FloorView, width_m: float) -> 
     roll, pitch = view.attitude.roll_rad, view.attitude.pitch_rad
     if abs(roll) > _MAX_TILT_RAD or abs(pitch) > _MAX_TILT_RAD:
         return []
-    inverse = np.linalg.inv(ground_homography(view.lens, view.mount, roll, pitch))
-    lever_m = float((level_from_body(roll, pitch) @ np.array(view.mount.offset_m))[2])
+    _, inverse, lever = _camera(view.lens, view.mount, roll, pitch)
+    lever_m = float(lever[2])
     area = 1.0 / (view.lens.fx_px * view.lens.fy_px)
     heights_m = []
     for line in lines:
         x, y = line.point_at((line.start_px + line.end_px) / 2)
         centre = view.lens.centre_px
         point = inverse @ np.array([x + centre[0], y + centre[1], 1.0])
-        along = inverse @ np.array([-math.sin(line.theta_rad), math.cos(line.theta_rad), 0.0])
         depth = float(point[2])
         if depth < 0.2 or not line.width_px > 0:  # the horizon, or nearly
             continue
+        along = inverse @ np.array([-math.sin(line.theta_rad), math.cos(line.theta_rad), 0.0])
         # A projective map makes an area 1/depth^3 times as large; what it is stretched along the line, it is
         # not stretched across.
         stretched = np.hypot(*(along[:2] * depth - point[:2] * along[2])) / depth**2
@@ -183,12 +203,12 @@ def floor_points(points_px: Sequence[tuple[float, float]], view: FloorView) -> l
     """(forward, right) on the floor, in the level frame of the body, of points of the picture (centred
     image coordinates), by the exact homography; [] when the view cannot place them."""
     roll, pitch = view.attitude.roll_rad, view.attitude.pitch_rad
-    lever: Matrix = np.asarray(level_from_body(roll, pitch) @ np.array(view.mount.offset_m), dtype=np.float64)
-    height_m = view.height_m - float(lever[2])
-    if not height_m > 0.02 or abs(roll) > _MAX_TILT_RAD or abs(pitch) > _MAX_TILT_RAD:
+    if abs(roll) > _MAX_TILT_RAD or abs(pitch) > _MAX_TILT_RAD:
         return []
-    homography = ground_homography(view.lens, view.mount, roll, pitch)
-    inverse: Matrix = np.asarray(np.linalg.inv(homography), dtype=np.float64)
+    _, inverse, lever = _camera(view.lens, view.mount, roll, pitch)
+    height_m = view.height_m - float(lever[2])
+    if not height_m > 0.02:
+        return []
     return _on_floor(points_px, inverse, view.lens.centre_px, height_m, lever)
 
 

@@ -7,7 +7,9 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
@@ -230,22 +232,40 @@ def write_flight(
     folder: Path, *, truth: bool = True, summary: bool = True, seed: int = 1, scans: bool = False
 ) -> Path:
     """Write `flight.mcap` (and `truth.mcap`, `summary.json`) to `folder`; returns the log's path."""
-    site = parse_site(SITE_TOML, "demo")
+    made = _made(seed, scans)
     path = folder / "flight.mcap"
-    metadata = {"vehicle": "ardupilot", "site": site.name}
-    with McapRecorder(path, when_full=wait_for_disk, metadata=metadata) as recorder:
-        recorder.record(Topic.MAP, 0, Document(SITE_TOML))  # stamps before the flight
-        recorder.record(Topic.CONFIG, START_NS, Document('[vehicle]\nkind = "ardupilot"\n'))
-        flown = _Flown(recorder, site, np.random.default_rng(seed))
-        for leg in legs(site, scans):
-            flown.fly(leg)
+    path.write_bytes(made.log)
     if truth:
-        with McapRecorder(folder / "truth.mcap", when_full=wait_for_disk) as recorder:
+        (folder / "truth.mcap").write_bytes(made.truth)
+    if summary:
+        (folder / "summary.json").write_text(json.dumps(SUMMARY | {"flight_time_s": made.seconds}))
+    return path
+
+
+@dataclass(frozen=True)
+class _Made:
+    log: bytes
+    truth: bytes
+    seconds: float
+
+
+@cache
+def _made(seed: int, scans: bool) -> _Made:
+    """Once in a process: many tests read the same flight."""
+    site = parse_site(SITE_TOML, "demo")
+    with TemporaryDirectory() as folder:
+        log, truth = Path(folder) / "flight.mcap", Path(folder) / "truth.mcap"
+        metadata = {"vehicle": "ardupilot", "site": site.name}
+        with McapRecorder(log, when_full=wait_for_disk, metadata=metadata) as recorder:
+            recorder.record(Topic.MAP, 0, Document(SITE_TOML))  # stamps before the flight
+            recorder.record(Topic.CONFIG, START_NS, Document('[vehicle]\nkind = "ardupilot"\n'))
+            flown = _Flown(recorder, site, np.random.default_rng(seed))
+            for leg in legs(site, scans):
+                flown.fly(leg)
+        with McapRecorder(truth, when_full=wait_for_disk) as recorder:
             for kinematics in flown.truths:
                 recorder.record(Topic.TRUTH, kinematics.stamp_ns, asdict(kinematics))
-    if summary:
-        (folder / "summary.json").write_text(json.dumps(SUMMARY | {"flight_time_s": flown.t_s}))
-    return path
+        return _Made(log.read_bytes(), truth.read_bytes(), flown.t_s)
 
 
 SUMMARY: dict[str, object] = {

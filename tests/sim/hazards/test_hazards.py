@@ -23,7 +23,7 @@ from flightd.site.site_file import load_site
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-CONFIG = load_config(CONFIGS / "sim.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"dwell_s": 0.5})
 SITE = load_site(CONFIGS / "site-demo.toml")
 SEEDS = range(1, 1 + int(os.environ.get("FLIGHTD_SEEDS", "1")))
 BODY_M = 0.3
@@ -44,6 +44,8 @@ class Trial:
     gust_mps: float = 0.3
     way_m: float = WAY_M
     visits: tuple[str, ...] = ("A3",)
+    limit_s: float = 100.0
+    """Until when it is flown, what waits without an end a little longer than until it waits."""
 
 
 def fault(**values: object) -> Callable[[IdealFlight], None]:
@@ -101,7 +103,9 @@ TRIALS: dict[str, Trial] = {
     "climb_wrong": Trial(drift(-1.0), drift(0.0), 3.0, found_s=1.0),
     "height_wrong": Trial(fault(height_m=-0.7), found_s=1.0),
     "attitude_wrong": Trial(fault(yaw_rad=math.radians(25.0)), found_s=1.0),
-    "battery_low": Trial(fault(battery=0.15), found_s=0.05, ends=Phase.SWAP, visits=("A2", "A3")),
+    "battery_low": Trial(
+        fault(battery=0.15), found_s=0.05, ends=Phase.SWAP, visits=("A2", "A3"), limit_s=35.0
+    ),
     "battery_critical": Trial(fault(battery=0.05), found_s=0.05),
     "battery_unknown": Trial(fault(battery=math.nan), found_s=3.2),
     "wind": Trial(blow(0.0, 3.5), found_s=9.0),
@@ -152,7 +156,7 @@ def fly(trial: Trial, seed: int, config: Config = CONFIG) -> tuple[Flown, float]
         return step(tick)
 
     flight.pilot.step = watch  # type: ignore[method-assign]
-    flown = flight.fly(100)
+    flown = flight.fly(trial.limit_s)
     assert begun_ns[0], "the fault never began"
     return flown, begun_ns[0] * 1e-9
 

@@ -1,7 +1,8 @@
 """Whatever fails in a control tick, the drone is levelled and landed, and the record is whole.
 
-Every public function that the pilot's step reaches is made to raise, at a random moment of a flight, once or
-for ever.  FLIGHTD_FAILURES says how many of these are flown, drawn by a fixed seed.
+Every public function that the pilot's step reaches in the air is made to raise, at a random one of the
+moments at which it is called, once or for ever.  FLIGHTD_FAILURES says how many of these are flown, drawn by
+a fixed seed.
 """
 
 from __future__ import annotations
@@ -50,6 +51,8 @@ TOGETHER = 10
 APART = {Pilot.step.__code__, LastResort.step.__code__}
 """What catches, and what flies then."""
 TICK_NS = 20_000_000
+EARLY_S = 24.0
+"""Until when after arming a function is made to raise that is called so early."""
 
 
 class InjectedError(Exception):
@@ -106,27 +109,41 @@ def name_of(code: CodeType) -> str:
     return f"{Path(code.co_filename).relative_to(PACKAGE).with_suffix('')}:{code.co_qualname}"
 
 
-def reached() -> dict[str, CodeType]:
-    """The public functions that the steps of a whole flight call, by name."""
-    found: set[CodeType] = set()
+def short_flight() -> IdealFlight:
+    return scan_flight(("A2",), site=ONE_SIDED)
+
+
+def reached() -> dict[str, tuple[CodeType, list[float]]]:
+    """The public functions that the steps of a whole flight call once it is armed, by name, with the times
+    since then."""
+    found = dict[CodeType, list[float]]()
+    now, armed_ns = set[CodeType](), list[int]()
 
     def note(frame: FrameType, event: str, _: Any) -> None:
         if event == "call":
-            found.add(frame.f_code)
+            now.add(frame.f_code)
 
-    flight = scan_flight(("A2",))
+    flight = short_flight()
     step = flight.pilot.step
 
     def noted(tick: TickInput) -> TickOutput:
+        now.clear()
         with profiled(note):
-            return step(tick)
+            output = step(tick)
+        if tick.vehicle is not None and tick.vehicle.armed:
+            armed_ns[:] = armed_ns or [tick.now_ns]
+            for code in now:
+                found.setdefault(code, []).append((tick.now_ns - armed_ns[0]) * 1e-9)
+        return output
 
     flight.pilot.step = noted  # type: ignore[method-assign]
     assert flight.fly().phase is Phase.DONE
     return {
-        name_of(code): code
-        for code in found - APART
-        if code.co_filename.startswith(PACKAGE) and not code.co_name.startswith(("_", "<"))
+        name_of(code): (code, times)
+        for code, times in found.items()
+        if code not in APART
+        and code.co_filename.startswith(PACKAGE)
+        and not code.co_name.startswith(("_", "<"))
     }
 
 
@@ -134,7 +151,7 @@ def fly_with(code: CodeType, at_s: float, *, once: bool) -> tuple[Flown, list[tu
     """A flight in which the function raises from that time after arming on, all that was recorded of it, and
     the tick in which it first raised, 0 for none."""
     kept: list[tuple[str, Any]] = []
-    flight: IdealFlight = scan_flight(("A2",))
+    flight = short_flight()
     flight.on_record = lambda topic, _stamp_ns, message: kept.append((topic, message))
     step, raised = _failing(flight.pilot.step, code, at_s, once=once)
     flight.pilot.step = step  # type: ignore[method-assign,assignment]
@@ -168,11 +185,12 @@ def _failing(
 
 @cache
 def trials() -> list[tuple[str, CodeType, bool, float]]:
-    """Each function once and for ever, from a time drawn; the first of them are flown."""
+    """Each function once and for ever, from a time drawn of those at which it is called; the first of them
+    are flown."""
     draw = random.Random(14)
     found = [
-        (name, code, once, draw.uniform(0.0, 24.0))
-        for name, code in sorted(reached().items())
+        (name, code, once, draw.choice([at_s for at_s in times if at_s <= EARLY_S] or times))
+        for name, (code, times) in sorted(reached().items())
         for once in (True, False)
     ]
     draw.shuffle(found)
@@ -244,7 +262,7 @@ class Broken:
 
 def test_whoever_fails_at_being_told_ends_no_flight_and_is_named_once() -> None:
     display, kept = Broken(), list[tuple[str, Any]]()
-    flight = scan_flight(("A2",), site=ONE_SIDED, observers=[display])
+    flight = scan_flight(("A3",), site=ONE_SIDED, observers=[display])
     flight.on_record = lambda topic, _stamp_ns, message: kept.append((topic, message))
     assert flight.fly(120.0).phase is Phase.DONE
     assert display.told > 100

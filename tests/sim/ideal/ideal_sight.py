@@ -48,6 +48,9 @@ class IdealEye:
         self._mount = mount
         self._errors = errors or EyeErrors()
         self._random = random.Random(f"eye {seed}")
+        u = (np.array([0.0, 0.0, 1.0, 1.0]) * (lens.width_px - 1) - lens.cx_px) / lens.fx_px
+        v = (np.array([0.0, 1.0, 0.0, 1.0]) * (lens.height_px - 1) - lens.cy_px) / lens.fy_px
+        self._corners = np.stack([u, v, np.ones(4)])
         paint = PaintMap.of(site)
         self._floors = [_samples(painted) for painted in site.lines]
         self._features = [
@@ -120,10 +123,7 @@ class IdealEye:
 
     def _reach_m(self, image_from_map: np.ndarray, eye: np.ndarray) -> float:
         """How far from the point below the camera the picture reaches at most; infinite if to the horizon."""
-        lens = self._lens
-        u = (np.array([0.0, 0.0, 1.0, 1.0]) * (lens.width_px - 1) - lens.cx_px) / lens.fx_px
-        v = (np.array([0.0, 1.0, 0.0, 1.0]) * (lens.height_px - 1) - lens.cy_px) / lens.fy_px
-        corners = image_from_map.T @ np.stack([u, v, np.ones(4)])
+        corners = image_from_map.T @ self._corners
         if (corners[2] <= _GRAZING).any():
             return math.inf
         return float((-eye[2] * np.hypot(corners[0], corners[1]) / corners[2]).max()) + _MARGIN_M
@@ -131,8 +131,9 @@ class IdealEye:
     def _junctions(self, image_from_map: np.ndarray, eye: np.ndarray, reach_m: float) -> tuple[Junction, ...]:
         """The crossings and ends in the picture, a little away from its border."""
         found = []
+        eye_x, eye_y = float(eye[0]), float(eye[1])
         for x, y, arms in self._features:
-            if math.hypot(x - eye[0], y - eye[1]) > reach_m:
+            if math.hypot(x - eye_x, y - eye_y) > reach_m:
                 continue
             here = self._pixel(x, y, image_from_map, eye)
             if here is None:
@@ -152,7 +153,7 @@ class IdealEye:
     ) -> tuple[float, float] | None:
         """Centred image coordinates of a point of the floor, None near or beyond the border."""
         lens = self._lens
-        a, b, c = (float(v) for v in image_from_map @ (np.array([x_m, y_m, 0.0]) - eye))
+        a, b, c = (image_from_map @ (np.array([x_m, y_m, 0.0]) - eye)).tolist()
         if c < 0.05:
             return None
         (cu, cv) = lens.centre_px
@@ -173,7 +174,8 @@ class IdealEye:
             return None
         centre_u, centre_v = lens.centre_px
         a, b = found[0], found[-1]
-        u0, v0, u1, v1 = u[a] - centre_u, v[a] - centre_v, u[b] - centre_u, v[b] - centre_v
+        u0, v0 = float(u[a]) - centre_u, float(v[a]) - centre_v
+        u1, v1 = float(u[b]) - centre_u, float(v[b]) - centre_v
         span = math.hypot(u1 - u0, v1 - v0)
         if span < _MIN_SPAN_PX:
             return None

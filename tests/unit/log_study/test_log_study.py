@@ -56,7 +56,10 @@ def told(sources: list[LogSource], found: Iterator[tuple[int, LogFindings]]) -> 
     return "\n".join(json.dumps(by_number[number].document()) for number in range(len(sources)))
 
 
-def serial(sources: list[LogSource]) -> str:
+@pytest.fixture(scope="module")
+def alone(flights: Path) -> str:
+    """What is found in them in one process, one after the other."""
+    sources = log_sources([str(flights)])
     return told(sources, ((number, study_source(one, STUDIES)) for number, one in enumerate(sources)))
 
 
@@ -101,10 +104,10 @@ def test_a_flight_of_today_is_seen_decided_and_judged_as_it_was(
 
 
 @pytest.mark.parametrize("work", [dies_once, always_dies])
-def test_a_worker_that_dies_costs_time_alone(flights: Path, tmp_path: Path, work: Work) -> None:
+def test_a_worker_that_dies_costs_time_alone(flights: Path, alone: str, tmp_path: Path, work: Work) -> None:
     shutil.copytree(flights, tmp_path / "flights")
     sources = log_sources([str(tmp_path / "flights")])
-    right = serial(sources)
+    right = alone.replace(str(flights), str(tmp_path / "flights"))
     (tmp_path / "flights" / "b" / work.__name__.replace("_", " ")).touch()
     found = dict(run_local(sources, STUDIES, 2, work))
     if work is dies_once:
@@ -115,11 +118,13 @@ def test_a_worker_that_dies_costs_time_alone(flights: Path, tmp_path: Path, work
     assert rest == [line for number, line in enumerate(right.splitlines()) if number != 1]
 
 
-def test_ray_finds_the_same_byte_for_byte_though_a_worker_is_killed(flights: Path, tmp_path: Path) -> None:
+def test_ray_finds_the_same_byte_for_byte_though_a_worker_is_killed(
+    flights: Path, alone: str, tmp_path: Path
+) -> None:
     pytest.importorskip("ray", reason="the tests of --engine ray need it: pip install -e '.[ray]'")
     shutil.copytree(flights, tmp_path / "flights")
     sources = log_sources([str(tmp_path / "flights")])
-    right = serial(sources)
+    right = alone.replace(str(flights), str(tmp_path / "flights"))
     (tmp_path / "flights" / "b" / "dies once").touch()
     assert told(sources, run_ray(sources, STUDIES, 2, dies_once)) == right
 
