@@ -430,7 +430,7 @@ class Status:
     predecessor), and total (mid-exposure to setpoint on the wire).  `height_goal_m` is the commanded height
     above the floor, None in logs that do not tell it; `sensors` what the lines say of the drone's own sensors
     (`core.tracks.SensorEstimate`); `view_x_m`, `view_y_m` the place on the map from which a shelf is looked
-    at, None (or NaN) where none is and in logs that do not tell it.
+    at, None where none is and in logs that do not tell it.
     """
 
     stamp_ns: int
