@@ -14,7 +14,12 @@ def check_pose(config: VehicleConfig, use: PoseUse) -> list[Check]:
         return []
     if use is PoseUse.GIVEN:
         return [ok("pose", "the autopilot's estimator takes our motion")]
-    text = "the autopilot's estimator does not take our motion"
+    if use is PoseUse.UNKNOWN:
+        text = "it is not known yet whether the autopilot's estimator takes our motion"
+        remedy = "check again; if it stays so, its firmware does not have a parameter that is needed"
+    else:
+        text = "the autopilot's estimator does not take our motion"
+        remedy = "set what is named of its parameters"
     if config.kind == "px4" and config.pose_output == "auto":
         return [ok("pose", text)]
-    return [warning("pose", text, "set what is named of its parameters")]
+    return [warning("pose", text, remedy)]

@@ -6,6 +6,8 @@ export default {
   "pose": "Position",
   "the autopilot's estimator takes our motion": "der Schätzer des Autopiloten nimmt unsere Bewegung an",
   "the autopilot's estimator does not take our motion": "der Schätzer des Autopiloten nimmt unsere Bewegung nicht an",
+  "it is not known yet whether the autopilot's estimator takes our motion": "es ist noch nicht bekannt, ob der Schätzer des Autopiloten unsere Bewegung annimmt",
+  "check again; if it stays so, its firmware does not have a parameter that is needed": "prüfen Sie noch einmal; bleibt es so, fehlt seiner Firmware ein Parameter, der nötig ist",
   "set what is named of its parameters": "stellen Sie ein, was von seinen Parametern genannt ist",
   "camera": "Kamera",
   "exposure": "Belichtung",
