@@ -192,8 +192,6 @@ class Pilot:
 
     def _sink_by_sight(self, tick: TickInput) -> Sinking | None:
         """Without a step of the mission: what has failed may be that alone."""
-        if self._config.vehicle.kind == "ardrone":  # it hovers by itself, and takes nothing but LAND then
-            return None
         dt_s = self._since_last_s(tick.now_ns)
         self._estimator.take(tick, self._commanded)
         known = self._estimator.step(tick.now_ns)

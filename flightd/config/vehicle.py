@@ -12,6 +12,8 @@ from flightd.config.section import Section
 PoseChoice: TypeAlias = Literal["auto", "none", "odometry", "vision_position"]
 _SPEAKING = frozenset({"ardupilot", "px4"})
 """Kinds that the adapter of our own speaks to."""
+DEFAULT_ORIGIN_DEG = 51.4778, 0.0
+"""Greenwich: a hall whose earth's field is another has to give its own."""
 _STATIONS = frozenset({245, 255})
 """System ids by which ground stations and their libraries go."""
 
@@ -64,7 +66,7 @@ class VehicleConfig(Section):
         Annotated[float, Field(ge=-90, le=90)],
         Annotated[float, Field(ge=-180, le=180)],
     ] = Field(
-        (51.4778, 0.0),
+        DEFAULT_ORIGIN_DEG,
         description="ArduCopter in flying_mode guided that takes pose_output: the hall's latitude and "
         "longitude, roughly: its compass is held against the earth's field there before it arms",
     )
@@ -118,6 +120,12 @@ class VehicleConfig(Section):
     def shares_pose(self) -> bool:
         """Whether it is told of our motion, if its parameters take it."""
         return self.pose_output != "none" and self.kind in _SPEAKING
+
+    @property
+    def sends_default_origin(self) -> bool:
+        """Whether an autopilot that takes our motion is told an origin, and not one of the hall's."""
+        guided = self.flying_mode == "guided" and self.shares_pose
+        return guided and self.origin_deg == DEFAULT_ORIGIN_DEG
 
     @property
     def stamp_file(self) -> Path | None:

@@ -70,11 +70,6 @@ class PlaceFill:
     overhang_m: float | None = None
 
     def __post_init__(self) -> None:
-        # a record has NaN for all that is not known
-        for name in ("share", "overhang_m"):
-            value = getattr(self, name)
-            if value is not None and math.isnan(value):
-                object.__setattr__(self, name, None)
         if self.share is not None and not 0.0 <= self.share <= 1.0:
             raise ValueError(f"a share of {self.share} outside 0..1")
         if self.overhang_m is not None and not 0.0 < self.overhang_m < math.inf:

@@ -250,6 +250,7 @@ class VehicleState:
     series (NaN and 0: not told).
     `climb_contradicted`: what it told of its climb was none, or ended, `climb_mps` is the height's.
     `keeps_climb`: it keeps a setpoint's climb rate by its own measurements, whatever it tells of them.
+    `hovers_unsteered`: it comes to rest over the floor by itself, also where it lands by itself.
     `refusal` is why it does not do what is demanded, `unfit` why the adapter would not arm it, as far as can
     be asked while it stands; None where nothing is against it.
     """
@@ -275,6 +276,7 @@ class VehicleState:
     climb_contradicted: bool = False
     keeps_climb: bool = False
     pose_use: PoseUse = PoseUse.NONE
+    hovers_unsteered: bool = False
 
     @property
     def may_fly(self) -> bool:
@@ -433,7 +435,7 @@ class Status:
     predecessor), and total (mid-exposure to setpoint on the wire).  `height_goal_m` is the commanded height
     above the floor, None in logs that do not tell it; `sensors` what the lines say of the drone's own sensors
     (`core.tracks.SensorEstimate`); `view_x_m`, `view_y_m` the place on the map from which a shelf is looked
-    at, None (or NaN) where none is and in logs that do not tell it.
+    at, None where none is and in logs that do not tell it.
     """
 
     stamp_ns: int

@@ -17,10 +17,12 @@ from flightd.core.planned_flight import PlannedFlight, StandingPlan
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, GridPose, Phase
 from flightd.mission.battery.swap import BatterySwap
 from flightd.mission.event_log import EventLog
+from flightd.mission.flight.leg_direction import LegDirection, leads_along_x
 from flightd.mission.flight.phase_progress import PhaseProgress
 from flightd.mission.flight.reference import ReferenceGenerator, ReferenceTask
 from flightd.mission.flight.relocation import Relocator
 from flightd.mission.guidance import CEILING_MARGIN_M, Guidance, MissionInputs
+from flightd.mission.hazard_reporter import NEAR_FLOOR, HazardReporter
 from flightd.mission.machine import (
     BEGIN,
     COMMANDS,
@@ -38,7 +40,6 @@ from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.plan_in_hand import PlanInHand
 from flightd.mission.reasons import Happened, Reason, in_words
 from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
-from flightd.mission.safety.hazard_table import ACTIONS, Action, triggers_of
 from flightd.mission.safety.loss_actions import LossActions
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.shelf_scan import ShelfScan
@@ -46,14 +47,9 @@ from flightd.mission.start_clearance import StartClearance
 from flightd.mission.triggers import Trigger
 from flightd.site.site import Site
 
-_NEAR_FLOOR = {Phase.TAKE_OFF, Phase.LAND}
-"""Where lines come and go."""
-_INTERRUPTED = (Phase.HOLD, Phase.RELOCATE, Phase.ACQUIRE)
-"""Where a leg that was interrupted goes on from."""
 _OVER_PAD_M = 0.5
 """So near its centre a landing goes on onto the pad, whatever the position was taken for before."""
 _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
-_RANK = {trigger: rank for rank, trigger in enumerate(Trigger)}
 
 
 class Mission:
@@ -85,6 +81,7 @@ class Mission:
         by_itself = config.mission.autostart if autostart is None else autostart
         self._clearance = StartClearance(config, self._events, autostart=by_itself)
         self._losses = LossActions(config, self._events)
+        self._hazards = HazardReporter(self._events)
         self._route = Itinerary(site, plan, policy, self._events)
         self._route.wanted = scanner.wants
         self._scan = ShelfScan(site, scanner)
@@ -101,7 +98,7 @@ class Mission:
         """It holds at the end of its way."""
         self._swapped = False
         """It has landed for a fresh battery, and goes on with nothing less."""
-        self._leg_along_x: bool | None = None
+        self._leg = LegDirection()
         self._obstacles: tuple[Reason, ...] = ()
         self._await_start()
 
@@ -255,7 +252,7 @@ class Mission:
         if Trigger.POSITION_SURE in doubts and not self._route.leads_on_from(inputs.pose):
             doubts = {Trigger.CUT_OFF}
         triggers = self._triggers(inputs) | doubts | self._scan.doubts(self.phase)
-        self._report_hazards(triggers, inputs.now_ns)
+        self._hazards.report(inputs.now_ns, triggers, self.state)
         _, trigger = next_state(self.state, triggers)
         if trigger is not None:
             self._begin(inputs, trigger)
@@ -319,33 +316,19 @@ class Mission:
 
     def _lost(self, action: LossAction, trigger: Trigger, now_ns: int) -> set[Trigger]:
         """What the configured action makes of something lost."""
-        if self.airborne or (not self.state.over and action is not LossAction.CONTINUE):
-            self._events.hazard(now_ns, trigger, action.value)
+        self._hazards.report_loss(now_ns, trigger, action, self.state)
         if action is LossAction.HOME and Trigger.HOME_IN_NEED in taken_in(self.state):
             self._go_home(Trigger.HOME_IN_NEED, Happened(trigger), now_ns)
         holds = set() if self._charging.presses else {Trigger.HOLD}
         return {LossAction.HOLD: holds, LossAction.LAND: {trigger}}.get(action, set())
 
-    def _report_hazards(self, triggers: set[Trigger], now_ns: int) -> None:
-        reported = triggers & ACTIONS.keys()
-        if not self.airborne:  # on the ground only what decides something there is worth reporting
-            reported &= taken_in(self.state)
-        elif self.phase in _NEAR_FLOOR:
-            reported &= taken_in(self.state) | triggers_of(Action.REPORT, Action.HOME)
-        for trigger in sorted(reported, key=_RANK.__getitem__):
-            self._events.hazard(now_ns, trigger, ACTIONS[trigger].value)
-
     def _situation(self, paused: bool) -> FlightContext:
-        if self.phase is Phase.FOLLOW:
-            self._leg_along_x = self._leads_along_x()
-        elif self.phase not in _INTERRUPTED:
-            self._leg_along_x = None
         return FlightContext(
             self.airborne,
             paused,
-            self._leg_along_x,
+            self._leg.step(self.phase, self.goal, self._steering.anchor),
             self.phase is Phase.HOLD,
-            at_height=self.airborne and self.phase not in _NEAR_FLOOR,
+            at_height=self.airborne and self.phase not in NEAR_FLOOR,
             takes_off=self.phase is Phase.TAKE_OFF,
         )
 
@@ -506,13 +489,9 @@ class Mission:
             self._reporter.land(s.vehicle.refusal if s.vehicle is not None and disarms else None)
         return guidance
 
-    def _leads_along_x(self) -> bool:
-        """The way to the goal is along its aisle, not from one aisle to another."""
-        goal, (x_m, y_m) = self.goal, self._steering.anchor
-        return abs(goal.x_m - x_m) >= abs(goal.y_m - y_m)
-
     def _task(self, now_ns: int) -> ReferenceTask:
         # from a shelf's lowest level neither aisle's line would be seen on the way to another aisle
-        cruise = self.state.returning or not self.goal.visit or not self._leads_along_x()
+        along_x = leads_along_x(self.goal, self._steering.anchor)
+        cruise = self.state.returning or not self.goal.visit or not along_x
         view = self._scan.view(self.phase)
         return ReferenceTask(self.state, self._progress.phase_s(now_ns), self.goal, view, cruise)

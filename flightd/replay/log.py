@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 import os
 import struct
 from collections.abc import Callable, Collection, Iterator
@@ -21,6 +20,7 @@ from flightd.core.refusal import RecordedRefusal, Refusal
 from flightd.core.tick import TickInput
 from flightd.core.topics import MESSAGE_TYPES, RecordedFrame, Topic
 from flightd.core.types import Event, EventLevel
+from flightd.replay.nan_values import with_nan
 from flightd.runtime.mcap_scan import (
     MAGIC,
     DamagedRecordError,
@@ -169,10 +169,6 @@ def _opened(path: Path) -> BinaryIO:
     raise InputError("not a flight log (an MCAP file was expected)", file=path)
 
 
-_PARTS = frozenset({"fill"})
-"""Null is there no number that is not known, but a part that is not there."""
-
-
 @cache
 def _decoder(kind: type) -> Decoder:
     if kind is Event:
@@ -185,33 +181,19 @@ def _decoder(kind: type) -> Decoder:
         try:
             return strict.decode(payload)
         except msgspec.ValidationError:
-            return converted(with_nan(msgspec.json.decode(payload)), kind)
+            return converted(msgspec.json.decode(payload), kind)
 
     return decode
 
 
-def with_nan(value: object) -> object:
-    """JSON has no NaN: the same value with NaN where null stands for a float that is no number."""
-    if value is None:
-        return math.nan
-    if isinstance(value, dict):
-        return {
-            key: item if item is None and key in _PARTS else with_nan(item) for key, item in value.items()
-        }
-    if isinstance(value, list):
-        return [with_nan(item) for item in value]
-    return value
-
-
 def converted(value: object, kind: type[MessageT]) -> MessageT:
     """JSON values as the message that they were recorded of; msgspec.ValidationError if they are none."""
-    return msgspec.convert(_without_empty_reasons(value), kind, dec_hook=_recorded_reason)
+    told = _without_empty_reasons(with_nan(value, kind))
+    return msgspec.convert(told, kind, dec_hook=_recorded_reason)
 
 
 def recorded_tick(path: Path, message: object) -> TickInput:
     """A message on TICK as the pilot was given it.  InputError if this version records no such."""
-    if isinstance(message, dict):  # null is "no vehicle yet" at the top and "no number" further in
-        message = {key: value if value is None else with_nan(value) for key, value in message.items()}
     try:
         return converted(message, TickInput)
     except msgspec.ValidationError as err:

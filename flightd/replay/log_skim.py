@@ -13,7 +13,7 @@ import msgspec
 from flightd.core.flight_order import ChosenPlan, FlightOrder
 from flightd.core.topics import RETAINED, Document, Topic
 from flightd.core.types import Status
-from flightd.replay.log import converted, with_nan
+from flightd.replay.log import converted
 from flightd.replay.log_chunks import LogChunks
 
 _FIRST_CHUNKS = 4
@@ -92,7 +92,7 @@ def _decoded(kind: type[T], payload: bytes) -> T | None:
     except msgspec.DecodeError:
         return None
     try:
-        return converted(with_nan(msgspec.json.decode(payload)), kind)
+        return converted(msgspec.json.decode(payload), kind)
     except (msgspec.MsgspecError, ValueError, TypeError):
         return None
 

@@ -202,6 +202,23 @@ def test_the_land_demand_brings_it_down_without_setpoints(on_rig: Any) -> None:
     on_rig(test)
 
 
+def test_a_vehicle_says_whether_it_comes_to_rest_unsteered(on_rig: Any) -> None:
+    async def test(rig: Rig) -> None:
+        await rig.take_off(1.5)
+        await rig.stream(1.5, pitch_rad=-0.1)
+        assert _speed_mps(rig) > 0.5
+        rig.vehicle.demand(Demand.LAND)
+        await asyncio.sleep(1.5)
+        assert (_speed_mps(rig) < 0.25) is rig.known().hovers_unsteered
+
+    on_rig(test)
+
+
+def _speed_mps(rig: Rig) -> float:
+    truth = rig.peer.truth()
+    return math.hypot(truth.vx_mps, truth.vy_mps)
+
+
 @pytest.mark.parametrize("demand", [Demand.HANDS_OFF, Demand.STANDBY])
 def test_letting_go_stops_the_stream_at_once(on_rig: Any, demand: Demand) -> None:
     async def test(rig: Rig) -> None:

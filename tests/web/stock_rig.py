@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import segno
@@ -17,12 +19,20 @@ from flightd.site.site import Site
 from flightd.site.site_file import load_site, site_toml
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg
 
+if TYPE_CHECKING:
+    from playwright.sync_api import Locator, Page
+
 SSCC = "340123450002439853"
 RUN = "2026-W47"
 RACKS = load_site(Path(__file__).parents[2] / "configs" / "site-racks-small.toml")
 """Two aisles with fronts on both sides."""
 _NS = 1_700_000_000 * 10**9
 POSE = CountPose("A1", 0.1, 0.0, 0.9, -1.57)
+
+
+def cell(page: Page, place: str) -> Locator:
+    """The place on its front."""
+    return page.get_by_role("button", name=re.compile(rf"^{re.escape(place)},"))
 
 
 def picture_of(text: str) -> bytes:

@@ -27,7 +27,11 @@ _SILENT_S = 1.0
 _TRAIL_STEP_M = 0.1
 _STAGES = ("capture", "transport", "detection", "track", "wire", "total")
 _COLOURS = {EventLevel.INFO: "", EventLevel.WARNING: "yellow", EventLevel.ERROR: "bold red"}
-_POSE_USES = {"given": "gets our motion", "not_taken": "does not take our motion"}
+_POSE_USES = {
+    "given": "gets our motion",
+    "not_taken": "does not take our motion",
+    "unknown": "not known yet whether it takes our motion",
+}
 _ALARMING = {Phase.RECOVER, Phase.HOLD, Phase.RELOCATE, Phase.LAND, Phase.ABORTED, Phase.PILOT}
 
 

@@ -205,20 +205,22 @@ class LastResort:
 
 def sinking_by_sight(inputs: MissionInputs, sink_mps: float) -> Guidance | None:
     """How it comes down at rest over the floor; None where the lines, the attitude, the height or the
-    vehicle tell too little for that, and low enough for the autopilot's own landing."""
+    vehicle tell too little for that, low enough for the autopilot's own landing, and where the vehicle comes
+    to rest in that by itself."""
     vehicle, pose, warnings = inputs.vehicle, inputs.pose, inputs.warnings
     if vehicle is None or pose is None:
         return None
-    knows = (
+    is_steered = (
         vehicle.armed
         and vehicle.in_control
         and vehicle.landed is LandedState.IN_AIR
+        and not vehicle.hovers_unsteered
         and inputs.sight_s < _SIGHT_S
         and inputs.telemetry_age_s < _TOLD_S
         and inputs.believed_height_m > _LEFT_TO_AUTOPILOT_M
         and not (warnings.height_stuck or warnings.climb_wrong)
     )
-    if not knows:
+    if not is_steered:
         return None
     reference = Reference(pose.x_m, pose.y_m, pose.yaw_rad, math.nan, climb_mps=-sink_mps)
     return Guidance(Phase.LAND, Guide.BRAKE, reference, Demand.KEEP, dead_reckoned=True)

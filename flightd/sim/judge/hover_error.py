@@ -44,7 +44,7 @@ def hover_errors(flight: FlightEvidence, visits: Iterable[Event]) -> list[float]
 def told_view(status: Status) -> Place | None:
     """The place on the map from which a shelf is looked at; None where the status tells none."""
     x_m, y_m = status.view_x_m, status.view_y_m
-    return None if x_m is None or y_m is None or not math.isfinite(x_m + y_m) else (x_m, y_m)
+    return None if x_m is None or y_m is None else (x_m, y_m)
 
 
 def _wanted(stop: Iterable[Status], site: Site, node: str) -> list[tuple[Place, Place]]:

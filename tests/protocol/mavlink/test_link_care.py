@@ -17,6 +17,7 @@ from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.required_parameters import Job
 from flightd.adapters.vehicle.mavlink.services.statustext import TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
+from flightd.config.vehicle import DEFAULT_ORIGIN_DEG
 from flightd.core.geometry import wrap_pi
 from flightd.core.refusal import words
 from flightd.core.shared_pose import SharedPose
@@ -207,6 +208,41 @@ def test_guided_by_our_pose_gets_an_origin_until_it_reports_one() -> None:
                 autopilot.say(dialect.MAVLink_attitude_message(1, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))  # a reboot
                 await asyncio.sleep(3.0)
                 assert len(autopilot.all("SET_GPS_GLOBAL_ORIGIN")) > known
+
+    virtual(test())
+
+
+@pytest.mark.parametrize(
+    ("sent_deg", "other_deg", "told"),
+    [
+        (DEFAULT_ORIGIN_DEG, None, True),
+        (DEFAULT_ORIGIN_DEG, (47.5, -8.25), False),
+        ((60.0, 10.0), None, False),
+    ],
+)
+def test_a_compass_refused_by_the_shipped_origin_is_told_to_be_so(
+    sent_deg: tuple[float, float], other_deg: tuple[float, float] | None, told: bool
+) -> None:
+    async def test() -> None:
+        autopilot = taking()
+        autopilot.results[ARM] = dialect.MAV_RESULT_FAILED
+
+        def refuse(command: Any) -> None:
+            if command.command == ARM:
+                autopilot.say(dialect.MAVLink_statustext_message(2, b"Arm: Check mag field (z diff:520>200)"))
+
+        autopilot.after = refuse
+        async with scripted(
+            autopilot, pose_form=PoseForm.ODOMETRY, origin_deg=sent_deg, job=Job(guided=True)
+        ) as (_, vehicle):
+            await asyncio.sleep(5.0)
+            place = (round(degrees * 1e7) for degrees in other_deg or sent_deg)
+            autopilot.say(dialect.MAVLink_gps_global_origin_message(*place, 0, 0))
+            vehicle.demand(Demand.FLY)
+            await asyncio.sleep(3.0)
+            refusal = words(known(vehicle).refusal)
+            assert "Check mag field" in refusal
+            assert ("vehicle.origin_deg is the shipped default" in refusal) is told
 
     virtual(test())
 

@@ -167,6 +167,7 @@ def test_sinking_by_sight_ends_by_time() -> None:
         {"vehicle": VEHICLE},
         {"vehicle": replace(FLYING, in_control=False)},
         {"vehicle": replace(FLYING, landed=LandedState.ON_GROUND)},
+        {"vehicle": replace(FLYING, hovers_unsteered=True)},
         {"x_age_s": 0.5, "y_age_s": 0.5},
         {"telemetry_age_s": 0.3},
         {"height_m": 0.3},

@@ -106,6 +106,7 @@ class ArDroneVehicle:
             refusal=self._flight.refusal(now_ns),
             unfit=self._unfit(),
             keeps_climb=True,
+            hovers_unsteered=True,
         )
 
     def _unfit(self) -> Refusal | None:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
-from flightd.adapters.vehicle.mavlink.refusal import ParameterUnread, ThrustMismatch
+from flightd.adapters.vehicle.mavlink.refusal import FarFromOrigin, ParameterUnread, ThrustMismatch
 from flightd.adapters.vehicle.mavlink.services.estimator_origin import Origin
 from flightd.adapters.vehicle.mavlink.setpoint import climb_thrust
 from flightd.adapters.vehicle.mavlink.vehicle import DEFAULTS, MavlinkOptions, MavlinkVehicle
+from flightd.config.vehicle import DEFAULT_ORIGIN_DEG
 from flightd.core.refusal import Refusal
-from flightd.core.types import AttitudeSetpoint
+from flightd.core.types import AttitudeSetpoint, VehicleState
 from flightd.ports import Clock
 
 GUIDED = dialect.COPTER_MODE_GUIDED
@@ -31,6 +33,8 @@ _SPEED_UP = ("WPNAV_SPEED_UP", "WP_SPD_UP")
 _SPEED_DOWN = ("WPNAV_SPEED_DN", "WP_SPD_DN")
 _DEFAULT_UP_MPS, _DEFAULT_DOWN_MPS = 2.5, 1.5
 _THRUST_IS_COLLECTIVE = 8
+_FIELD_CHECK = "Check mag field"
+"""What it says before it is armed, of a compass that the earth's field contradicts."""
 
 
 class ArduPilotVehicle(MavlinkVehicle):
@@ -55,6 +59,7 @@ class ArduPilotVehicle(MavlinkVehicle):
         self.flying_mode = GUIDED if options.job.guided else GUIDED_NOGPS
         self._raw_thrust = options.job.raw_thrust
         self._flies_raw = False
+        self._has_default_origin = options.origin_deg == DEFAULT_ORIGIN_DEG
         self._origin: Origin | None = None
         if options.job.guided and options.pose_form is not None:
             self._origin = Origin(
@@ -64,6 +69,15 @@ class ArduPilotVehicle(MavlinkVehicle):
                 options.origin_deg,
                 lambda: self.gives_pose,
             )
+
+    def state(self) -> VehicleState | None:
+        state = super().state()
+        by_default = self._has_default_origin and self._origin is not None and self._origin.is_ours
+        if state is None or state.refusal is None or not by_default:
+            return state
+        if _FIELD_CHECK not in str(state.refusal):
+            return state
+        return replace(state, refusal=FarFromOrigin(state.refusal))
 
     def mode_name(self, custom_mode: int) -> str:
         return _MODE_NAMES.get(custom_mode, f"mode {custom_mode}")

@@ -15,7 +15,7 @@ from flightd.adapters.vehicle.mavlink.link.connection import Firmware, MavlinkLi
 from flightd.adapters.vehicle.mavlink.link.endpoint import parse_endpoint
 from flightd.adapters.vehicle.mavlink.link.signing import Signing, setup_message
 from flightd.adapters.vehicle.mavlink.link.transport import make_transport
-from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding, judge_all
+from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding, Rule, judge_all
 from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
 from flightd.adapters.vehicle.mavlink.pose_sharing import pose_use
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, advice_for, rules_for
@@ -121,6 +121,9 @@ class Examination:
             if self._signs and not self._has_key:
                 remedy = "it signs its messages: give its key as vehicle.signing_key"
             raise UnavailableError(f"{self._url}: the autopilot is heard but does not answer; {remedy}")
+        for rule in self._pose_rules(firmware):  # also where they are not even advised
+            if not rule.optional and rule.names not in wanted:
+                await self._parameters.read(rule.names)
         if math.isnan(self._heartbeat_hz):
             self._heartbeat_hz = await self._measure_beats()
         return ExaminationReport(
@@ -135,13 +138,17 @@ class Examination:
             self._pose_use(firmware),
         )
 
-    def _pose_use(self, firmware: Firmware) -> PoseUse:
-        """What would become of our motion."""
+    def _pose_rules(self, firmware: Firmware) -> tuple[Rule, ...]:
+        """What it would have to be set to for our motion; empty where it is not to be told of it."""
         job = self._job
         if job.pose_output == "none":
-            return PoseUse.NONE
-        rules = pose_rules(firmware, job.pose_output, landing_target=job.landing_target)
-        return pose_use(rules, self._parameters.get)
+            return ()
+        return pose_rules(firmware, job.pose_output, landing_target=job.landing_target)
+
+    def _pose_use(self, firmware: Firmware) -> PoseUse:
+        """What would become of our motion."""
+        rules = self._pose_rules(firmware)
+        return pose_use(rules, self._parameters.get) if rules else PoseUse.NONE
 
     async def fix(self, findings: Sequence[ParameterFinding]) -> list[ParameterFinding]:
         """Write the better values and read them back; the findings that remain.  Nothing is written to

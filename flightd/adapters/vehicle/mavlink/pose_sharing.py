@@ -57,7 +57,9 @@ class PoseSharing:
         pose: SharedPose | None,
         pad_m: tuple[float, float] | None,
     ) -> Iterator[Message]:
-        """What is due now: that it stands, or what a new frame showed, and the pad while it is near."""
+        """What is due now: that it stands, or what a new frame showed, and the pad while it is near.  A frame
+        that shows the pad's mat but no line tells no motion, and so no pad: what would be sent in its place
+        is carried on by the autopilot's own word, which its estimator carries on itself."""
         output = self._output
         self._flown = state.armed and (self._flown or pose is not None or state.landed is LandedState.IN_AIR)
         if output is None or self.use is not PoseUse.GIVEN:

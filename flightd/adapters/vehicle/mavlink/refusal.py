@@ -134,6 +134,17 @@ class ExplainedRefusal(Refusal):
 
 
 @dataclass(frozen=True, slots=True)
+class FarFromOrigin(Refusal):
+    """The compass does not agree with the earth's field at an origin that nobody has chosen."""
+
+    refusal: Refusal
+
+    def __str__(self) -> str:
+        origin = "vehicle.origin_deg is the shipped default: set it to the hall's latitude and longitude"
+        return f"{self.refusal}; {origin}"
+
+
+@dataclass(frozen=True, slots=True)
 class TakenOver(Refusal):
     """The vehicle is in a mode that we did not ask for."""
 

@@ -32,6 +32,7 @@ from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry, version_words
+from flightd.config.vehicle import DEFAULT_ORIGIN_DEG
 from flightd.core.refusal import Refusal
 from flightd.core.shared_pose import SharedPose
 from flightd.core.types import (
@@ -74,7 +75,7 @@ class MavlinkOptions:
     job: Job = field(default_factory=Job)
     signing: Signing | None = None
     pose_form: PoseForm | None = None
-    origin_deg: tuple[float, float] = (51.4778, 0.0)
+    origin_deg: tuple[float, float] = DEFAULT_ORIGIN_DEG
     opener: OpenDatagrams = open_datagrams
     """What opens its UDP socket."""
 

@@ -35,16 +35,17 @@ class Origin:
         self._commander = commander
         self._system_id = system_id
         self._place = round(place_deg[0] * 1e7), round(place_deg[1] * 1e7)
-        self.is_set = False
+        self.is_set = self.is_ours = False
 
     def take(self, message: Message) -> None:
-        """GPS_GLOBAL_ORIGIN says that there is one."""
+        """GPS_GLOBAL_ORIGIN says that there is one, and whether it is the one that is sent."""
         if message.get_type() == "GPS_GLOBAL_ORIGIN":
             self.is_set = True
+            self.is_ours = (message.latitude, message.longitude) == self._place
 
     def forget(self) -> None:
         """The autopilot rebooted."""
-        self.is_set = False
+        self.is_set = self.is_ours = False
 
     async def run(self) -> None:
         """Keep it set until cancelled; started when the autopilot is heard."""

@@ -11,6 +11,7 @@ export default {
   "bit 3 of GUID_OPTIONS is {state}, against vehicle.raw_thrust: see flightd doctor": "Bit 3 von GUID_OPTIONS ist {state}, gegen vehicle.raw_thrust: siehe flightd doctor",
   "set": "gesetzt",
   "not set": "nicht gesetzt",
+  "{refusal}; vehicle.origin_deg is the shipped default: set it to the hall's latitude and longitude": "{refusal}; vehicle.origin_deg ist die mitgelieferte Vorgabe: Setzen Sie ihn auf Breite und Länge der Halle",
   "the pilot or a failsafe changed the mode": "der Pilot oder eine Sicherung hat den Modus geändert",
   "disarming: {why}": "Entschärfen: {why}",
   "nobody says that it stands": "niemand meldet, dass es steht",
