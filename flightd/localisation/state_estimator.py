@@ -19,10 +19,11 @@ from flightd.localisation.pose_history import PoseHistory
 from flightd.site.site import Site
 from flightd.tracking.attitude_response import AttitudeResponse
 from flightd.tracking.carried_height import CarriedHeight
+from flightd.tracking.carried_motion import NO_LEAD, Lead
 from flightd.tracking.climb_doubt import ClimbDoubt
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
-from flightd.tracking.line_tracker import NO_LEAD, Lead, LineTracker
+from flightd.tracking.line_tracker import LineTracker
 from flightd.tracking.stuck_height import StuckHeight
 
 _LATE_GAIN, _MOST_LATE_S = 0.02, 0.15

@@ -21,6 +21,7 @@ from flightd.config.tracking import MotionNoise, SensorPriors
 from flightd.core.geometry import Matrix
 from flightd.core.learnt import LearntSensors
 from flightd.core.tracks import SensorEstimate
+from flightd.tracking.first_doubt import LEAST_HEIGHT_SHARE, drift_of, first_sigmas
 from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, placed
 from flightd.tracking.held_lines import SURE_HITS, HeldLine, associate, refound
 from flightd.tracking.innovations import Innovations
@@ -59,9 +60,7 @@ _TILTS = [HEIGHT, *range(ROLL, DELAY), SCALE]
 """All of the sensors but the delay."""
 _BUT_MOTION = [PSI, PSI_RATE, *range(LEAK, FIRST_LINE)]
 """All but velocities, disturbances, the error of the attitude and the lines."""
-_YAW_SIGMA_RAD, _YAW_RATE_SIGMA_RADPS = math.radians(5.0), 0.005
-"""Of the heading before it is told at all, and of its drift whenever it is."""
-_LEAST_HEIGHT_SHARE, _MOST_HEIGHT_SHARE = 0.001, 0.05
+_MOST_HEIGHT_SHARE = 0.05
 _MOST_LEAK_PER_S = 1.0
 _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
@@ -95,33 +94,14 @@ class FloorFilter:
         self._latency_s = latency_s
         self._noise, self._priors = noise, priors
         self._gate_m, self._forget_ns, self._max_lines = gate_m, forget_ns, max_lines
-        self._next_id = 0
-        self.held: list[HeldLine] = []
-        sigmas = np.zeros(FIRST_LINE)
-        sigmas[[PSI, PSI_RATE]] = _YAW_SIGMA_RAD, _YAW_RATE_SIGMA_RADPS
-        sigmas[[VX, VY]] = noise.start_velocity_mps
-        sigmas[[PUSH_X, PUSH_Y]] = noise.start_disturbance_mps2
-        sigmas[HEIGHT] = _LEAST_HEIGHT_SHARE
-        sigmas[[ROLL, PITCH]] = priors.attitude_rad
-        sigmas[LEAK] = priors.leak_per_s
-        sigmas[[MOUNT_ROLL, MOUNT_PITCH]], sigmas[MOUNT_YAW] = priors.mount_rad, priors.mount_yaw_rad
-        sigmas[DELAY], sigmas[SCALE] = priors.delay_s, priors.scale_share
-        self._first_sigmas = sigmas
+        self._next_id, self.held = 0, list[HeldLine]()
+        self._first_sigmas = first_sigmas(noise, priors)
         self._x: Matrix = np.zeros(FIRST_LINE)
         self._x[LEAK] = priors.leak_per_s
-        self._p: Matrix = np.diag(sigmas**2)
-        drift = np.zeros(FIRST_LINE)
-        drift[[PSI, PSI_RATE]] = priors.heading_radps, 0.1 * priors.heading_radps
-        drift[[ROLL, PITCH]] = priors.attitude_rad * math.sqrt(2.0 / priors.attitude_s)
-        drift[LEAK] = priors.leak_per_s * 0.02
-        drift[[MOUNT_ROLL, MOUNT_PITCH]] = priors.mount_rad * 0.002
-        drift[MOUNT_YAW] = priors.mount_yaw_rad * 0.002
-        drift[DELAY], drift[SCALE] = priors.delay_s * 0.01, priors.scale_share * 0.01
-        self._drift = drift
+        self._p: Matrix = np.diag(self._first_sigmas**2)
+        self._drift = drift_of(priors)
         self.height_known_to(0.0)
-        self._steady = [0.0, 0.0]
-        self._unseen_s = [0.0, 0.0]
-        self._followed_ns = [0, 0]
+        self._steady, self._unseen_s, self._followed_ns = [0.0, 0.0], [0.0, 0.0], [0, 0]
         self._refused: set[int | None] = set()
         self._innovations = Innovations(priors.shake_rad, priors.shake_bounds_rad)
 
@@ -224,12 +204,12 @@ class FloorFilter:
     def forget(self) -> None:
         """Know no line and no motion any more; what was learnt of the sensors stays."""
         self._drop(range(len(self.held)))
-        self._begin_anew([VX, VY, PUSH_X, PUSH_Y])
+        self.stand()
         self._innovations.forget()
 
     def height_known_to(self, share: float) -> None:
         """Standard deviation of the told height, as a share of it."""
-        share = min(max(share, _LEAST_HEIGHT_SHARE), _MOST_HEIGHT_SHARE)
+        share = min(max(share, LEAST_HEIGHT_SHARE), _MOST_HEIGHT_SHARE)
         self._drift[HEIGHT] = share * math.sqrt(2.0 / HEIGHT_S)
 
     def predict(self, dt_s: float, roll_rad: float, pitch_rad: float, yaw_rad: float) -> None:
@@ -453,9 +433,8 @@ class FloorFilter:
             self._mind(errors / np.sqrt(np.diag(spread)), measured.axes)
 
     def _bound_push(self) -> None:
-        most = self._noise.max_disturbance_mps2
-        self._bound(PUSH_X, -most, most)
-        self._bound(PUSH_Y, -most, most)
+        for push in PUSH:
+            self._bound(push, -self._noise.max_disturbance_mps2, self._noise.max_disturbance_mps2)
 
     def _bound(self, index: int, least: float, most: float) -> None:
         self._x[index] = min(max(self._x[index], least), most)

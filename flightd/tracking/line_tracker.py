@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 from flightd.config.control import TiltCompensation
 from flightd.config.tracking import TrackingConfig
@@ -20,6 +19,7 @@ from flightd.core.tracks import NOT_SEEN, FloorJunction, MarkerOffset, PadOffset
 from flightd.core.types import Attitude, LineSet
 from flightd.tracking.attitude_history import AttitudeHistory
 from flightd.tracking.carried_heading import CarriedHeading
+from flightd.tracking.carried_motion import NO_LEAD, ExposureMotion, Lead
 from flightd.tracking.feature_trust import FeatureTrust
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.ground_junctions import floor_junctions
@@ -68,31 +68,6 @@ _ASSUMED_TILT_RAD = math.radians(2.0)
 _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
 _DEFAULTS = TrackingConfig()
-
-
-class Lead(NamedTuple):
-    """What the motion changes by until a setpoint that goes out now begins to act: way and speed along the
-    grid axes, and the heading."""
-
-    x_m: float
-    y_m: float
-    vx_mps: float
-    vy_mps: float
-    yaw_rad: float
-
-
-NO_LEAD = Lead(0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-class ExposureMotion(NamedTuple):
-    """The motion at the exposure of the newest frame: the attitude told for then, heading, speed along the
-    grid axes with its variances (NaN along an axis of which that frame tells nothing), and the way since."""
-
-    attitude: Attitude
-    yaw_rad: float
-    speed_mps: tuple[float, float]
-    variances: tuple[float, float]
-    since_m: tuple[float, float]
 
 
 class LineTracker:

@@ -13,7 +13,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.types import AttitudeSetpoint, GridPose, Phase
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
-from flightd.tracking.line_tracker import NO_LEAD, Lead
+from flightd.tracking.carried_motion import NO_LEAD, Lead
 
 _TOUCHDOWN_S = 2.0
 
