@@ -31,7 +31,7 @@ _LATE_GAIN, _MOST_LATE_S = 0.02, 0.15
 _FREE_S, _LEAST_EASE = 0.15, 0.35
 """The configured gains are for a loop that is no later than this, beside the attitude's own; a later one
 answers more slowly in proportion, down to this share."""
-_JITTERS = 4.0
+_JITTERS, _MOST_JITTER_S = 4.0, 0.5
 """What comes from the vehicle errs by twice its mean deviation now and then; what goes there by as much."""
 _ATTITUDE_LAG_S = 0.2
 """Of an attitude loop of 10 rad/s, for which the gains are."""
@@ -86,7 +86,7 @@ class StateEstimator:
         self._least_integrity = least_integrity
         self._heights = HeightHistory()
         self.response = AttitudeResponse()
-        self._telemetry_s = self._jitter_s = 0.0
+        self._telemetry_s = self._late_s = self._jitter_s = 0.0
         self._attitude_ns = 0
         self._obeys = False
         self.frames = FrameMonitor()
@@ -143,18 +143,17 @@ class StateEstimator:
         obeys = self._obeys_now(tick)
         self.response.sent(tick.now_ns, commanded if obeys else None)
         for sample in tick.attitudes:
-            late_s = min(max((tick.now_ns - sample.stamp_ns) * 1e-9, 0.0), _MOST_LATE_S)
-            self._jitter_s += _LATE_GAIN * (abs(late_s - self._telemetry_s) - self._jitter_s)
-            self._telemetry_s += _LATE_GAIN * (late_s - self._telemetry_s)
+            late_s = max((tick.now_ns - sample.stamp_ns) * 1e-9, 0.0)
+            self._telemetry_s += _LATE_GAIN * (min(late_s, _MOST_LATE_S) - self._telemetry_s)
             self._attitude_ns = sample.stamp_ns
             self.tracker.attitude(sample)
             self.poses.add_attitude(sample)
             self.response.told(sample, obeys=obeys)
+        if tick.attitudes:
+            self._mind_jitter((tick.now_ns - self._attitude_ns) * 1e-9)
         self.tracker.assume(self.response.foreseen(tick.now_ns))
         if tick.vehicle is not None:
             v = tick.vehicle
-            if not v.armed:
-                self.tracker.stand()
             if not self._stuck.found:
                 self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
             self._count_climb(tick.now_ns, v.climb_mps)
@@ -167,6 +166,11 @@ class StateEstimator:
             lines = self._waiting.popleft()
             self._judged_ns = lines.stamp_ns
             self._take_frame(lines)
+
+    def _mind_jitter(self, late_s: float) -> None:
+        late_s = min(max(late_s, 0.0), _MOST_JITTER_S)
+        self._jitter_s += _LATE_GAIN * (abs(late_s - self._late_s) - self._jitter_s)
+        self._late_s += _LATE_GAIN * (late_s - self._late_s)
 
     def _obeys_now(self, tick: TickInput) -> bool:
         """Whether the vehicle does as it is told; one that fell silent goes on with what it did."""

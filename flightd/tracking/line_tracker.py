@@ -24,6 +24,7 @@ from flightd.tracking.feature_trust import FeatureTrust
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.ground_squares import placed_squares
+from flightd.tracking.gyro_judge import GyroJudge
 from flightd.tracking.heading_dispute import HeadingDispute, Turned
 from flightd.tracking.line_sight import (
     FeatureSight,
@@ -62,8 +63,9 @@ from flightd.tracking.width_heights import WidthHeights
 _STEP_NS = 20_000_000
 _FARTHEST = 3.0
 """A feature further off than so many heights is told by hardly anything."""
-_WATCHED_NS = 1_000_000_000
-"""A floor of which no frame came for longer is not watched."""
+_WATCHED_NS = 10_000_000_000
+"""For so long without a line the drift of gyros stays within degrees."""
+_HARDLY_RISEN_M = 0.5
 _ASSUMED_TILT_RAD = math.radians(2.0)
 _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
@@ -97,7 +99,7 @@ class LineTracker:
         self._params = params
         self._start_yaw_rad = start_yaw_rad
         self._history, self._as_told = AttitudeHistory(), AttitudeHistory()
-        self._carried_heading = CarriedHeading()
+        self._carried_heading, self._judge = CarriedHeading(), GyroJudge()
         self._headed = False
         forget_ns = round(params.forget_s * 1e9)
         self._filter = FloorFilter(params.noise, params.priors, params.gate_m, forget_ns, latency_s)
@@ -175,7 +177,7 @@ class LineTracker:
 
     def attitude(self, sample: Attitude) -> None:
         """Take a sample of telemetry."""
-        carried = self._carried_heading.take(sample, watched=sample.stamp_ns - self._stamp_ns < _WATCHED_NS)
+        carried = self._carried_heading.take(sample, watched=sample.stamp_ns - self._lines_ns < _WATCHED_NS)
         self._as_told.add(sample)
         self._history.add(carried)
         self._dispute.told(carried)
@@ -183,11 +185,6 @@ class LineTracker:
             self._headed = True
             offset = wrap_pi(self._start_yaw_rad - carried.yaw_rad)
             self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
-
-    def stand(self) -> None:
-        """The motors do not turn: until lines are seen again the drone stands, or has hardly risen, and leans
-        that are told move it nowhere."""
-        self._stands = True
 
     def exposed_ns(self, lines: LineSet) -> int:
         """When the frame was exposed, by what has been learnt of the camera's delay."""
@@ -209,6 +206,7 @@ class LineTracker:
             self.rejected += 1
             return False
         self._told_ns = lines.stamp_ns
+        self._stands = self._stands and height_m < _HARDLY_RISEN_M
         self._filter.height_known_to(height_sigma_m / height_m)
         self._advance(stamp_ns)
         view = self._view(attitude, stamp_ns, height_m)
@@ -255,9 +253,10 @@ class LineTracker:
 
     def exposure_motion(self, now_ns: int) -> ExposureMotion | None:
         """What the newest frame tells of the motion; None where it was laid over an attitude that was only
-        assumed, or lines contradict the heading."""
+        assumed, or lines or gyros contradict the heading."""
         seen_in, held, told = self._seen_in, self._filter, self._as_told.at(self._stamp_ns)
-        if seen_in is None or told is None or self._stamp_ns == 0 or self.heading_error_rad:
+        doubted = self._dispute.error_rad or self._carried_heading.leapt_lately
+        if seen_in is None or told is None or self._stamp_ns == 0 or doubted:
             return None
         by_lines = held.speeds(self._stamp_ns)
         variances = [
@@ -321,6 +320,8 @@ class LineTracker:
         if not self._headed or self._stamp_ns == 0 or then_ns <= now_ns:
             return NO_LEAD
         yaw_now, yaw_then = (self._attitude_at(stamp_ns).yaw_rad for stamp_ns in (now_ns, then_ns))
+        if self._stands:
+            return NO_LEAD._replace(yaw_rad=wrap_pi(yaw_then - yaw_now))
         vx, vy = self._carried_to(now_ns)[:2]
         then_vx, then_vy, moved_x, moved_y = self._carried(now_ns, then_ns, vx, vy)[:4]
         return Lead(moved_x, moved_y, then_vx - vx, then_vy - vy, wrap_pi(yaw_then - yaw_now))
@@ -328,6 +329,8 @@ class LineTracker:
     def unleant(self, now_ns: int) -> tuple[float, float]:
         """Acceleration along the grid axes (m/s2) that the told lean does not explain: push of the air and
         error of the told attitude, as they are expected then; drag is not in it."""
+        if self._stands:
+            return 0.0, 0.0
         held, told = self._filter, self._attitude_at(now_ns)
         as_told = lean(held.without_errors(), Told(told.roll_rad, told.pitch_rad, told.yaw_rad))[0]
         (ax, ay), ahead_s = self._accel(now_ns), (now_ns - self._stamp_ns) * 1e-9
@@ -464,6 +467,13 @@ class LineTracker:
         agreed = any(
             agrees(turn, line.sigma_theta_rad, sigma) for turn, line in zip(turns, on_floor, strict=True)
         )
+        carried, told = self._carried_heading, self._as_told.at(attitude.stamp_ns)
+        if told is not None and not carried.gyros_wrong:
+            offset_rad, parted = wrap_pi(yaw - told.yaw_rad), carried.leapt_lately
+            right_rad = self._judge.step(attitude.stamp_ns, offset_rad, turns, parted=parted)
+            if right_rad is not None:
+                carried.distrust()
+                held.turn_to(right_rad, self._params.start_yaw_sigma_rad)
         turned = self._dispute.step([-turn for turn in turns], agreed, attitude.stamp_ns)
         if turned is Turned.CAMERA:
             self._knocked = True

@@ -72,7 +72,7 @@ def test_attitudes_come_once_in_order_with_the_time_at_which_they_were_true(on_r
 
         best_ms = min(range(-20, 21), key=lambda ms: error(ms * 1_000_000))
         # threads of a library beside a loop that pauses with the machine see the pauses
-        assert abs(best_ms) <= (4 if not rig.late_s else 15)
+        assert abs(best_ms) <= (4 if not rig.late_s else 10)
 
     on_rig(test)
 

@@ -79,7 +79,7 @@ def test_a_flight_counts_every_location_of_its_nodes_and_proves_them_at_home() -
 
 
 def test_a_pause_amid_a_scan_loses_and_doubles_nothing() -> None:
-    flight = scan_flight(("A2",), site=ONE_SIDED, stock=PLAIN)
+    flight = scan_flight(("A2",), site=ONE_SIDED)
     paused: list[int] = []
 
     def order(phase: Phase, now_ns: int) -> None:

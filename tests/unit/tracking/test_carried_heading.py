@@ -45,8 +45,8 @@ def turning(at_s: float) -> float:
 @pytest.mark.parametrize("bend_radps", [0.0, 0.08, -0.08])
 def test_gyros_carry_the_heading_through_a_field_bent_by_steel(bend_radps: float) -> None:
     heading, yaw_rad = carried(lambda t: turning(t) + bend_radps * t, noisy(TURN_RADPS))
-    assert yaw_rad == pytest.approx(turning(4.0), abs=0.002)
-    assert heading.lead_rad == pytest.approx(-bend_radps * 4.0, abs=0.002)
+    assert yaw_rad == pytest.approx(turning(4.0), abs=0.01)
+    assert heading.lead_rad == pytest.approx(-bend_radps * 4.0, abs=0.01)
     assert heading.leap_rad == 0.0
 
 
@@ -59,7 +59,7 @@ def test_where_nobody_watches_the_floor_the_heading_is_the_told_one() -> None:
 @pytest.mark.parametrize("rate_radps", [math.nan, 0.0, 0.02, 50.0, math.inf])
 def test_a_rate_that_is_none_or_stands_still_or_absurd_is_not_believed(rate_radps: float) -> None:
     heading, yaw_rad = carried(turning, lambda _: rate_radps)
-    assert yaw_rad == pytest.approx(turning(4.0), abs=5 * PERIOD_S * TURN_RADPS)
+    assert yaw_rad == pytest.approx(turning(4.0), abs=1e-9)
     assert heading.leap_rad == 0.0
 
 
@@ -78,7 +78,25 @@ def test_a_told_heading_that_leaps_is_not_followed_and_shown_for_a_while(leap_ra
     heading, yaw_rad = carried(told, noisy(TURN_RADPS), seconds=2.0)
     assert yaw_rad == pytest.approx(turning(2.0), abs=0.01)
     assert heading.leap_rad == pytest.approx(leap_rad, abs=0.02)
-    assert carried(told, noisy(TURN_RADPS), seconds=4.0)[0].leap_rad == 0.0
+    assert heading.leapt_lately
+    later, _ = carried(told, noisy(TURN_RADPS), seconds=4.0)
+    assert later.leap_rad == pytest.approx(leap_rad, abs=0.02), "it is still not right"
+    assert not later.leapt_lately
+
+
+def test_a_told_heading_that_swings_away_without_a_leap_is_shown_and_one_that_comes_back_is_not() -> None:
+    def told(at_s: float, back_s: float) -> float:
+        return turning(at_s) + min(max(at_s - 1.0, 0.0), 0.4) - min(max(at_s - back_s, 0.0), 0.4)
+
+    away, yaw_rad = carried(lambda t: told(t, 99.0), noisy(TURN_RADPS))
+    assert yaw_rad == pytest.approx(turning(4.0), abs=0.01)
+    assert away.leap_rad == pytest.approx(0.4, abs=0.11)
+    assert carried(lambda t: told(t, 2.0), noisy(TURN_RADPS))[0].leap_rad == 0.0
+
+
+def test_a_leap_that_gyros_deny_is_not_followed_without_lines_either() -> None:
+    _, yaw_rad = carried(lambda t: 0.4 * (t > 1.0), noisy(0.0), watched=lambda _: False)
+    assert yaw_rad == pytest.approx(0.0, abs=0.01)
 
 
 def test_samples_out_of_order_change_nothing() -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import pytest
 
 from flightd.config.tracking import MotionNoise, TrackingConfig, TrackingExpert
-from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount
+from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount, wrap_pi
 from flightd.core.types import Attitude, Line, LineSet
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.random_sites import random_site
@@ -108,10 +109,23 @@ def test_before_a_line_is_seen_a_lean_that_is_told_moves_nothing() -> None:
     tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0)
     for i in range(1, 90):
         tracker.attitude(Attitude(i * FRAME_NS, math.radians(2.0), 0.0, 0.0))
-        tracker.frame(LineSet(i, i * FRAME_NS, 640, 360, (), (), "ideal"), HEIGHT_M)
-    tracks = tracker.at(89 * FRAME_NS + LATE_NS)
+        tracker.frame(LineSet(i, i * FRAME_NS, 640, 360, (), (), "ideal"), 0.2)
+    now_ns = 89 * FRAME_NS
+    tracks = tracker.at(now_ns + LATE_NS)
     assert tracks is not None
     assert (tracks.vx_mps, tracks.vy_mps) == (0.0, 0.0)
+    assert tracker.lead(now_ns, now_ns + 150_000_000)[:4] == (0.0, 0.0, 0.0, 0.0)
+    assert tracker.unleant(now_ns) == (0.0, 0.0)
+
+
+def test_what_rises_without_a_line_is_dead_reckoned_again() -> None:
+    tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0)
+    for i in range(1, 90):
+        tracker.attitude(Attitude(i * FRAME_NS, math.radians(2.0), 0.0, 0.0))
+        tracker.frame(LineSet(i, i * FRAME_NS, 640, 360, (), (), "ideal"), 0.2 if i < 60 else 1.0)
+    tracks = tracker.at(89 * FRAME_NS)
+    assert tracks is not None
+    assert tracks.vy_mps == pytest.approx(GRAVITY_MPS2 * math.tan(math.radians(2.0)), abs=0.1)
 
 
 @pytest.mark.parametrize("rates", [True, False])
@@ -125,7 +139,46 @@ def test_a_compass_that_steel_bends_turns_the_heading_only_where_no_gyro_tells(r
         tracker.frame(LineSet(99 + i, at_ns, 640, 360, (), (), "ideal"), HEIGHT_M)
     tracks = tracker.at(now_ns + 59 * FRAME_NS)
     assert tracks is not None
-    assert math.degrees(tracks.yaw_rad) == pytest.approx(0.0 if rates else 17.7, abs=0.7)
+    assert math.degrees(tracks.yaw_rad) == pytest.approx(0.0 if rates else 17.7, abs=2.0)
     motion = tracker.exposure_motion(now_ns + 59 * FRAME_NS)
     assert motion is not None
     assert math.degrees(motion.attitude.yaw_rad) == pytest.approx(17.7, abs=0.3), "the vehicle's own, as told"
+
+
+@pytest.mark.parametrize(
+    ("felt", "turns", "most_deg"),
+    [
+        pytest.param(lambda r: r, True, 1.0, id="right"),
+        pytest.param(lambda r: -r, True, 35.0, id="wrong sign"),
+        pytest.param(lambda _: 0.0, True, 20.0, id="feels nothing"),
+        pytest.param(lambda r: r + math.radians(20.0), False, 20.0, id="biased"),
+        pytest.param(lambda r: r + math.radians(40.0), False, 30.0, id="biased worse"),
+    ],
+)
+def test_lines_find_out_gyros_that_are_wrong_and_the_told_heading_counts(
+    felt: Callable[[float], float], turns: bool, most_deg: float
+) -> None:
+    """Lines alone would leave such a heading wrong by a right angle."""
+    tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0)
+    eye, start = IdealEye(SITE, LENS, Mount(), EyeErrors(0.1, 0.0002), 1), SITE.nodes["A1"]
+    waiting: list[tuple[int, LineSet]] = []
+    next_frame, yaw_rad, errors = 0, 0.0, []
+    for now_ns in range(20_000_000, 8_000_000_000, 20_000_000):
+        from_s = now_ns * 1e-9 - 2.0
+        rate_radps = 0.5 if turns and 0.0 < from_s < math.pi else 0.0
+        yaw_rad += rate_radps * 0.02
+        noise = 1e-3 * math.sin(now_ns)
+        told_radps = noise + (felt(rate_radps) if from_s > 0.0 else rate_radps)
+        tracker.attitude(Attitude(now_ns, 0.0, 0.0, yaw_rad, told_radps))
+        if now_ns >= next_frame:
+            next_frame += FRAME_NS
+            k = Kinematics(now_ns, start.x_m, start.y_m, HEIGHT_M, 0, 0, 0, 0, 0, yaw_rad, 0, 0, 0)
+            waiting.append((now_ns + LATE_NS, eye.see(k, next_frame, now_ns)))
+        while waiting and waiting[0][0] <= now_ns:
+            tracker.frame(waiting.pop(0)[1], HEIGHT_M)
+        tracks = tracker.at(now_ns)
+        if tracks is not None:
+            errors.append(abs(math.degrees(wrap_pi(tracks.yaw_rad - yaw_rad))))
+    assert max(errors) < most_deg
+    assert errors[-1] < 6.0
+    assert (tracker.heading_error_rad != 0.0) is (most_deg > 1.0), "it is told, too"
