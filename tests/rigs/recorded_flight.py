@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from tests.rigs.small_camera import small_camera_file
+from tests.rigs.small_camera import at_once, small_camera_file
 
 NODES: Final = ("A2", "A3")
 SEED: Final = 203
@@ -32,7 +32,7 @@ def fly_once(shared: Path) -> Path:
 def _fly(out: Path, scenario: Path) -> None:
     route = f"mission.nodes={','.join(NODES)}"
     options = ["--seed", str(SEED), "--set", route, "--scenario", str(scenario), "--out", str(out), "--json"]
-    command = [sys.executable, "-m", "flightd", "sim", *options]
+    command = [sys.executable, "-m", "flightd", "sim", *options, *at_once()]
     done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_S, check=False)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == json.loads((out / "summary.json").read_text())
