@@ -169,7 +169,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "attitude_wrong",
         Trigger.ATTITUDE_WRONG,
-        "heading by the lines against the vehicle's, or the told heading against the gyros by 6 degrees within"
+        "heading by the lines against the vehicle's, or the told one against the gyros by 6 degrees within"
         " half a second, by more than `hazards.heading_deg` for `hazards.disagree_s`",
         Action.LAND,
         "the heading is carried by the gyros and taken from the lines; land by them",
