@@ -31,8 +31,8 @@ _LATE_GAIN, _MOST_LATE_S = 0.02, 0.15
 _FREE_S, _LEAST_EASE = 0.15, 0.35
 """The configured gains are for a loop that is no later than this, beside the attitude's own; a later one
 answers more slowly in proportion, down to this share."""
-_JITTERS, _MOST_JITTER_S = 4.0, 0.5
-"""What comes from the vehicle errs by twice its mean deviation now and then; what goes there by as much."""
+_JITTERS, _MOST_JITTER_S = 2.0, 0.5
+"""What comes from the vehicle jitters by so much in the mean; what goes there by as much again."""
 _ATTITUDE_LAG_S = 0.2
 """Of an attitude loop of 10 rad/s, for which the gains are."""
 _UNLEANT_S = 0.3
