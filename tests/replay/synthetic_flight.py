@@ -233,6 +233,7 @@ def write_flight(
 ) -> Path:
     """Write `flight.mcap` (and `truth.mcap`, `summary.json`) to `folder`; returns the log's path."""
     made = _made(seed, scans)
+    folder.mkdir(parents=True, exist_ok=True)
     path = folder / "flight.mcap"
     path.write_bytes(made.log)
     if truth:

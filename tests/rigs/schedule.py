@@ -31,12 +31,11 @@ _TOGETHER = {
     "tests/web/test_flight_functions.py",
     "tests/web/test_flight_fuzz.py",
     "tests/web/test_flights_api.py",
-    "tests/web/test_navigation.py",
     "tests/web/test_studio_api.py",
 }
 """Modules whose tests share what took long to make."""
 _ON_ONE_DATABASE = "tests/unit/ground_store/"
-_IN_BROWSER = re.compile(r"tests/web/test_(?:\w*page|language)\.py")
+_IN_BROWSER = re.compile(r"tests/web/test_(?:\w*page|language|navigation)\.py")
 """Each starts a Chromium, and a station for all its tests."""
 _COMPUTING = (
     "tests/sim/",

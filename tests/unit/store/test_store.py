@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import random
 import resource
 import shutil
@@ -74,10 +73,6 @@ def test_how_full_a_place_is_is_read_back_as_it_was_and_merged(
 def test_no_place_is_fuller_than_full_or_emptier_than_empty(share: float) -> None:
     with pytest.raises(ValueError, match="outside"):
         PlaceFill(share)
-
-
-def test_what_a_record_has_no_number_for_is_not_known() -> None:
-    assert PlaceFill(math.nan, math.nan) == PlaceFill(None)
 
 
 def test_where_in_the_picture_a_code_was_does_not_make_another_look(tmp_path: Path) -> None:
