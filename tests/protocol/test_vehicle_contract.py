@@ -106,12 +106,12 @@ def test_tilt_is_obeyed_with_its_sign(on_rig: Any) -> None:
 
 def test_the_climb_rate_is_obeyed_with_its_sign(on_rig: Any) -> None:
     async def test(rig: Rig) -> None:
-        await rig.take_off()
+        await rig.take_off(2.0)
         for climb_mps in (0.4, -0.3):
             await rig.stream(1.0, climb_mps=climb_mps)
             start_m = rig.peer.truth().height_m
-            await rig.stream(1.0, climb_mps=climb_mps)
-            assert rig.peer.truth().height_m - start_m == pytest.approx(climb_mps, abs=0.06)
+            await rig.stream(2.0, climb_mps=climb_mps)
+            assert (rig.peer.truth().height_m - start_m) / 2.0 == pytest.approx(climb_mps, abs=0.06)
             assert rig.known().climb_mps == pytest.approx(climb_mps, abs=0.1)
 
     on_rig(test)
@@ -166,7 +166,7 @@ def test_a_landed_vehicle_is_not_armed_again_by_the_same_demand(on_rig: Any) -> 
         await rig.take_off(0.5)
         while rig.known().armed:
             await rig.stream(0.1, climb_mps=-0.3)
-        await rig.stream(2.5, climb_mps=0.5)  # it would ask once a second
+        await rig.stream(5.0, climb_mps=0.5)
         assert not rig.known().armed
         assert rig.peer.truth().height_m == pytest.approx(0.1, abs=0.01)
         rig.vehicle.demand(Demand.STANDBY)
@@ -246,7 +246,7 @@ def test_the_pilot_wins_within_a_tenth_of_a_second_and_for_good(on_rig: Any) -> 
         taken = rig.known().mode
         for demand in (Demand.FLY, Demand.LAND, Demand.DISARM, Demand.FLY):
             rig.vehicle.demand(demand)
-            sent = await rig.stream(1.2, roll_rad=0.1)  # it would ask twice a second
+            sent = await rig.stream(2.0, roll_rad=0.1)
             assert not any(sent), demand
             assert rig.known().mode == taken, demand
             assert rig.known().armed
