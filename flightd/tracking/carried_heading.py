@@ -31,19 +31,17 @@ class CarriedHeading:
         self._heading_rad = 0.0
         self._lively = 0
         self._apart: deque[tuple[int, float]] = deque()
-        self._leap_rad, self._leap_ns = 0.0, 0
-        self.gyros_wrong = False
-
-    @property
-    def leap_rad(self) -> float:
+        self.leap_rad = 0.0
         """By how much the told heading has turned faster against the gyros than any steel turns it; 0 if it
         has not, or has turned back."""
-        return self._leap_rad
+        self._leapt_ns: int | None = None
+        self.gyros_wrong = False
 
     @property
     def leapt_lately(self) -> bool:
         """The told heading turned so, or the gyros are wrong, within the last second or two."""
-        return self._last is not None and self._last.stamp_ns - self._leap_ns < _SHOWN_NS
+        last, leapt_ns = self._last, self._leapt_ns
+        return last is not None and leapt_ns is not None and last.stamp_ns - leapt_ns < _SHOWN_NS
 
     @property
     def lead_rad(self) -> float:
@@ -85,8 +83,8 @@ class CarriedHeading:
         turned_rad = sum(apart for _, apart in self._apart)
         if abs(turned_rad) > _ASTRAY_RAD:
             self._apart.clear()
-            whole_rad = self._leap_rad + turned_rad
-            self._leap_rad, self._leap_ns = whole_rad if abs(whole_rad) > _ASTRAY_RAD else 0.0, stamp_ns
+            whole_rad = self.leap_rad + turned_rad
+            self.leap_rad, self._leapt_ns = whole_rad if abs(whole_rad) > _ASTRAY_RAD else 0.0, stamp_ns
 
     def _felt_rad(self, last: Attitude, sample: Attitude, dt_s: float) -> float:
         """What the gyros felt between two samples; NaN where they tell nothing of it."""

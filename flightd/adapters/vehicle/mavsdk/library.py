@@ -54,22 +54,23 @@ def _log(level: LogLevel, message: str, _file: str | None, _line: int) -> bool:
     return True
 
 
-def whole_fields(document: str, *names: str) -> tuple[int, ...] | None:
-    """Whole numbers out of the JSON in which the library hands a message over; None if one is missing."""
+def _fields(document: str, names: tuple[str, ...], read: Callable[[Any], T]) -> tuple[T, ...] | None:
+    """Fields out of the JSON in which the library hands a message over; None if one is missing or none."""
     try:
         fields = json.loads(document)
-        return tuple(int(fields[name]) for name in names)
+        return tuple(read(fields[name]) for name in names)
     except (ValueError, TypeError, KeyError, OverflowError):
         return None
+
+
+def whole_fields(document: str, *names: str) -> tuple[int, ...] | None:
+    """Whole numbers out of such a message; None if one is missing."""
+    return _fields(document, names, int)
 
 
 def real_fields(document: str, *names: str) -> tuple[float, ...] | None:
     """Numbers out of such a message, NaN where it has none; None if one is missing."""
-    try:
-        fields = json.loads(document)
-        return tuple(math.nan if fields[name] is None else float(fields[name]) for name in names)
-    except (ValueError, TypeError, KeyError, OverflowError):
-        return None
+    return _fields(document, names, lambda value: math.nan if value is None else float(value))
 
 
 def whole_list(document: str, name: str) -> tuple[int, ...] | None:

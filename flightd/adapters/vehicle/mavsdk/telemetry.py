@@ -19,7 +19,7 @@ from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _CLIMB_STALE_NS = 500_000_000
-_ATTITUDE_FIELDS = ("roll", "pitch", "yaw", "pitchspeed", "yawspeed")
+_ATTITUDE_FIELDS = ("time_boot_ms", "roll", "pitch", "yaw", "pitchspeed", "yawspeed")
 _RANGE_FIELDS = ("id", "orientation", "current_distance", "min_distance", "max_distance")
 
 _MODES = {int(mode): mode for mode in FlightMode}
@@ -57,10 +57,14 @@ class MavsdkTelemetry(NewestReadings):
 
     def take_attitude(self, document: str, now_ns: int) -> None:
         """The fields of an ATTITUDE as they came: the library parts the rates from the angles."""
-        boot, told = whole_fields(document, "time_boot_ms"), real_fields(document, *_ATTITUDE_FIELDS)
-        if boot is None or told is None or not all(abs(angle) <= math.tau for angle in told[:3]):
+        told = real_fields(document, *_ATTITUDE_FIELDS)
+        if (
+            told is None
+            or not math.isfinite(told[0])
+            or not all(abs(angle) <= math.tau for angle in told[1:4])
+        ):
             return  # NaN too
-        (boot_ms,), (roll, pitch, yaw, *rates) = boot, told
+        boot_ms, (roll, pitch, yaw, *rates) = int(told[0]), told[1:]
         rebooted = has_rebooted(boot_ms, self._boot_ms)
         if rebooted:
             self._sync.reset()
