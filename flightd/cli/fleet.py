@@ -39,6 +39,12 @@ def sim(
     misaligned: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Share of landings without contact, on these.")
     ] = 0.1,
+    hub_kills: Annotated[
+        float, typer.Option(min=0.0, max=60.0, help="Kills of the station an hour; a new one goes on.")
+    ] = 2.0,
+    broker_kills: Annotated[
+        float, typer.Option(min=0.0, max=60.0, help="Times an hour that all links are cut at once.")
+    ] = 2.0,
     compare: Annotated[
         bool, typer.Option("--compare", help="Fly one drone alone, too: the speed-up.")
     ] = False,
@@ -47,9 +53,9 @@ def sim(
     """Let a fleet count a hall in a fast world without pixels, and judge it by where the drones truly are.
 
     Their pace is not what is planned, links are cut, positions doubted, batteries drawn and charged; drones
-    fail between shelves, and an aisle is closed.  Each is charged on its own pad, unless there are docks,
-    which all of them share then.  Bad is: a shared cell, a deadlock, a battery below its
-    reserve, a place that is neither counted nor has a reason why not.
+    fail between shelves, an aisle is closed, the station is killed and another one goes on.  Each drone is
+    charged on its own pad, unless there are docks, which all of them share then.  Bad is: a shared cell, a
+    deadlock, a battery below its reserve, a place that is neither counted nor has a reason why not.
 
     \b
     Examples:
@@ -71,6 +77,8 @@ def sim(
         swaps=swaps,
         contacts=contacts,
         misaligned=misaligned,
+        hub_kills_per_h=hub_kills,
+        broker_kills_per_h=broker_kills,
     )
     result = fly_fleet(scenario)
     document = result.document()
@@ -94,6 +102,7 @@ def _in_words(d: dict[str, object]) -> list[str]:
         f" below the reserve {d['below_reserve']}, places without an answer {d['unanswered']}",
         f"least distance of two drones {d['least_distance_m']} m, least charge {d['least_charge']},"
         f" planned {d['replans']} times",
+        f"killed: the station {d['hub_kills']} times, all links {d['broker_kills']} times",
     ]
     lines += _dock_lines(d)
     if d["failed"]:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
 
 from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.plan import Action
 from flightd.sim.fleet.judge import FleetJudge
 from flightd.sim.fleet.simulation import FleetScenario, FleetSimulation, fly_fleet
 from flightd.sim.fleet.world import FleetDrone, Unknowns
 
 SMALL = FleetScenario(drones=4, aisles=6, nodes=8, hours=3.0, failing=1, fails_s=(60.0, 240.0))
+LEFT_ALONE = replace(SMALL, hub_kills_per_h=0.0, broker_kills_per_h=0.0)
 ROUGH = Unknowns(pace_sigma=0.2, slow_per_h=8, link_cuts_per_h=20, link_cut_s=60, doubts_per_h=10, doubt_s=40)
 
 
@@ -29,6 +32,35 @@ def test_a_fleet_in_trouble_counts_every_place_or_says_why_not(seed: int) -> Non
     assert 0 < document["places"] - document["counted"] <= 16 * len(result.reasons)
     assert document["least_distance_m"] > 0.9
     assert document["least_charge"] >= SMALL.endurance.reserve
+
+
+@pytest.mark.parametrize("contacts", [0, 2])
+def test_stations_that_are_killed_again_and_again_let_nobody_meet_and_lose_nothing(contacts: int) -> None:
+    result = fly_fleet(replace(SMALL, contacts=contacts, hub_kills_per_h=40.0, broker_kills_per_h=10.0))
+    assert result.judge.faults == []
+    assert result.hub_kills > 20
+    assert result.broker_kills > 5
+    assert result.failed
+    assert 0 < result.places - result.counted <= 16 * len(result.reasons)
+    assert 1 <= len(result.reasons) <= 3, "beside the one that failed"
+
+
+def test_a_drone_takes_nothing_twice_that_two_stations_tell_it() -> None:
+    simulation = FleetSimulation(replace(SMALL, hours=0.2, failing=0, closes_aisle=False))
+    told: list[tuple[str, int, int]] = []
+    tell = simulation.world.tell
+
+    def twice(name: str, first: int, actions: Sequence[Action], *, paused: bool) -> None:
+        tell(name, first, actions, paused=paused)
+        drone = simulation.world.drones[name]
+        had = list(drone.base)
+        tell(name, first, actions, paused=paused)
+        assert list(drone.base) == had
+        told.append((name, first, len(had)))
+
+    simulation.world.tell = twice  # type: ignore[method-assign]
+    simulation.run()
+    assert any(length > 2 for _, _, length in told)
 
 
 def test_the_same_seed_flies_the_same() -> None:
@@ -82,7 +114,7 @@ def test_below_the_reserve_and_standing_still_are_faults() -> None:
 
 
 def test_a_fleet_fills_its_batteries_at_shared_docks_alone_and_waits_for_them_at_home() -> None:
-    docked = replace(SMALL, drones=5, aisles=10, nodes=10, failing=0, closes_aisle=False, swaps=1)
+    docked = replace(LEFT_ALONE, drones=5, aisles=10, nodes=10, failing=0, closes_aisle=False, swaps=1)
     simulation = FleetSimulation(docked)
     filled: dict[str, int] = {}
     charge = {drone.name: drone.charge for drone in simulation.world.drones.values()}
@@ -109,8 +141,10 @@ def test_a_fleet_fills_its_batteries_at_shared_docks_alone_and_waits_for_them_at
 
 
 def test_who_lands_without_contact_says_so_lands_anew_and_takes_another_dock_in_the_end() -> None:
-    docked = replace(SMALL, aisles=10, nodes=10, failing=0, closes_aisle=False, contacts=2, misaligned=1.0)
-    result = fly_fleet(replace(docked, hours=0.6))
+    docked = replace(
+        LEFT_ALONE, aisles=10, nodes=10, failing=0, closes_aisle=False, contacts=2, misaligned=1.0
+    )
+    result = fly_fleet(replace(docked, hours=0.6, misaligned=1.0))
     document = result.document()
     assert {fault.kind for fault in result.judge.faults} <= {"deadlock"}, "nobody flies below its reserve"
     assert all(dock["landings"] == dock["without_contact"] > 0 for dock in document["docks"])
@@ -127,7 +161,7 @@ def test_who_lands_without_contact_says_so_lands_anew_and_takes_another_dock_in_
 
 
 def test_a_full_battery_that_takes_no_more_is_no_missing_contact() -> None:
-    docked = replace(SMALL, aisles=10, nodes=10, failing=0, closes_aisle=False, contacts=4)
+    docked = replace(LEFT_ALONE, aisles=10, nodes=10, failing=0, closes_aisle=False, contacts=4)
     simulation = FleetSimulation(docked)
     step, full = simulation.world.step, 0
 

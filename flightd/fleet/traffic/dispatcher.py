@@ -156,7 +156,7 @@ class Dispatcher:
         freed = self._near(drone)
         self.control.enter(drone, place, ends=(pad,))
         self._heard_ms[drone] = now_ms
-        if place != pad:
+        if not self.docks.flies_on(drone, pad) and place != pad:
             self._held |= set(self.control.replan([drone], now_ms))
         self._free(freed)
         return True

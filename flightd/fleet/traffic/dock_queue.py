@@ -8,7 +8,7 @@ dock has one drone at a time, from when it is chosen until that drone has left i
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -36,6 +36,14 @@ class Standing:
 
     charge: float
     charging: bool | None
+
+
+@dataclass(frozen=True, slots=True)
+class KeptTries:
+    """Of one drone: its landings without contact on the dock where it is, and the docks that it gave up."""
+
+    landings: int
+    shunned: tuple[str, ...]
 
 
 class DockQueue:
@@ -66,9 +74,27 @@ class DockQueue:
         return bool(self._docks)
 
     def home(self, drone: str) -> int:
-        """Its own pad."""
+        """Its own pad: that on which it entered, or comes home to since it was flown on."""
         course = self._control.drones[drone]
         return self._homes.setdefault(drone, course.ends[0]) if self._docks else course.ends[0]
+
+    def flies_on(self, drone: str, home: int) -> bool:
+        """A drone entered anew that comes home to this pad.  Whether it may stay where it is: on a dock."""
+        self._homes[drone] = home
+        place = self._control.drones[drone].place
+        return any(place == dock.place for dock in self._docks.values())
+
+    def kept(self) -> dict[str, KeptTries]:
+        """What whoever goes on with this queue has to know."""
+        return {
+            drone: KeptTries(self._landings.get(drone, 0), tuple(sorted(self._shunned.get(drone, ()))))
+            for drone in {*self._landings, *self._shunned}
+        }
+
+    def remember(self, kept: Mapping[str, KeptTries]) -> None:
+        """Go on with what another one kept."""
+        for drone, tries in kept.items():
+            self._landings[drone], self._shunned[drone] = tries.landings, set(tries.shunned)
 
     def keep_ms(self, drone: str) -> int:
         """What has to be left of a battery on the drone's own pad: the way to a dock."""
@@ -94,11 +120,15 @@ class DockQueue:
         return next((self._docks[name] for name, holder in self._holder.items() if holder == drone), None)
 
     def _free_docks(self) -> None:
-        """Of those who are neither on it nor going there."""
+        """Of those who are neither on it nor going there; who stands on one has it, however he came there."""
         for name, drone in list(self._holder.items()):
             course, place = self._control.drones[drone], self._docks[name].place
             if place not in (course.place, _end_of(course)) and not course.wreck:
                 del self._holder[name]
+        at = {dock.place: name for name, dock in self._docks.items() if name not in self._holder}
+        for drone, course in self._control.drones.items() if at else ():
+            if course.place in at and not course.ahead:
+                self._holder[at.pop(course.place)] = drone
 
     def _watch_contact(self, drone: str, standing: Standing, now_ms: int) -> None:
         course, dock = self._control.drones[drone], self._dock_of(drone)

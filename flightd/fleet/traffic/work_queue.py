@@ -46,6 +46,16 @@ class TourTimes:
     home_ms: Callable[[str], int]
 
 
+@dataclass(frozen=True, slots=True)
+class KeptWork:
+    """All of a queue that outlives the process that has it: who was given what does not, for nobody knows
+    whether he still does it."""
+
+    work: tuple[NodeWork, ...]
+    done: tuple[str, ...]
+    reasons: Mapping[str, str]
+
+
 class WorkQueue:
     """Nodes that wait, are given to a drone, are done, or cannot be done for a reason."""
 
@@ -55,6 +65,19 @@ class WorkQueue:
         self._given: dict[str, str] = {}
         self.done: list[str] = []
         self.reasons: dict[str, str] = {}
+
+    @classmethod
+    def of(cls, kept: KeptWork) -> WorkQueue:
+        """Go on with it; what drones were given waits again."""
+        queue = cls(kept.work)
+        queue.done, queue.reasons = list(kept.done), dict(kept.reasons)
+        for node in (*kept.done, *kept.reasons):
+            queue._open.pop(node, None)
+        return queue
+
+    def kept(self) -> KeptWork:
+        """As it is to be kept."""
+        return KeptWork(tuple(self._work.values()), tuple(self.done), dict(self.reasons))
 
     def work(self, node: str) -> NodeWork:
         """KeyError for a node without work."""

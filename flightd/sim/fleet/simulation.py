@@ -9,16 +9,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from flightd.fleet.traffic.cells import CellSize
-from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
+from flightd.fleet.traffic.dispatcher import DroneReport
 from flightd.fleet.traffic.dock_queue import docks_of
 from flightd.fleet.traffic.docks import Dock
 from flightd.fleet.traffic.endurance import Endurance
 from flightd.fleet.traffic.lanes import LaneGraph, lanes_of
-from flightd.fleet.traffic.plan import Action
-from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.traffic.work_queue import NodeWork, WorkQueue
 from flightd.mission.plan.leg_times import Pace
 from flightd.sim.fleet.hall import fleet_hall
+from flightd.sim.fleet.hub import FleetFloorPlan, FleetHub
 from flightd.sim.fleet.judge import FleetJudge, fault_document
 from flightd.sim.fleet.world import FleetWorld, Unknowns
 from flightd.site.shelf_cells import by_node
@@ -47,7 +46,8 @@ class FleetScenario:
     """What is flown.  `failing` drones fail between shelves after they counted for a time within `fails_s`,
     each after a while of its own; one aisle is closed from `closed_from` to `closed_to`, shares of the
     hours.  Of the docks, if there are any, `swaps` swap a battery in `swap_s`, and `contacts` charge it; a
-    share `misaligned` of the landings on these finds no contact."""
+    share `misaligned` of the landings on these finds no contact.  The hub is killed and away for a while, and
+    all links are cut at once, as by a broker that dies; both so often an hour."""
 
     drones: int = 10
     aisles: int = 40
@@ -63,6 +63,10 @@ class FleetScenario:
     contacts: int = 0
     swap_s: float = 90.0
     misaligned: float = 0.1
+    hub_kills_per_h: float = 2.0
+    hub_away_s: float = 30.0
+    broker_kills_per_h: float = 2.0
+    broker_away_s: float = 30.0
     unknowns: Unknowns = field(default_factory=Unknowns)
     endurance: Endurance = field(default_factory=Endurance)
     cell: CellSize = field(default_factory=CellSize)
@@ -82,6 +86,8 @@ class FleetResult:
     least_charge: float
     failed: tuple[str, ...]
     replans: int
+    hub_kills: int
+    broker_kills: int
     docks: Mapping[str, Any]
 
     @property
@@ -116,6 +122,8 @@ class FleetResult:
             "least_distance_m": round(judge.least_m, 3) if judge.least_m < 1e9 else None,
             "least_charge": round(self.least_charge, 3),
             "failed": list(self.failed),
+            "hub_kills": self.hub_kills,
+            "broker_kills": self.broker_kills,
             "replans": self.replans,
             **self.docks,
             "faults": [fault_document(fault) for fault in judge.faults],
@@ -155,14 +163,19 @@ class FleetSimulation:
             self.docks,
             scenario.misaligned,
         )
-        self.control = TrafficControl(self.lanes, PACE, scenario.cell)
-        self.queue = WorkQueue(work_of(self.site))
-        self.dispatcher = Dispatcher(self.control, self.queue, e, docks=self.docks)
         self.judge = FleetJudge(scenario.cell, e.reserve)
         rng = random.Random(f"fleet {scenario.seed}")
+        pads_of: dict[str, int] = {}
         for i, pad in enumerate(homes, start=1):
             drone = self.world.add(f"drone-{i}", pad, f"{scenario.seed} {i}")
-            self.control.enter(drone.name, pad)
+            pads_of[drone.name] = pad
+        self._plan = FleetFloorPlan(self.lanes, PACE, scenario.cell, e, pads_of, self.docks)
+        self._hub: FleetHub | None = FleetHub(self._plan, WorkQueue(work_of(self.site)))
+        self._hubs = [self._hub]
+        self._kept = self._hub.keep()
+        self._away_until_s = 0.0
+        self._broker_kills = 0
+        self._kills = random.Random(f"kills {scenario.seed}")
         for name in rng.sample(sorted(self.world.drones), min(scenario.failing, scenario.drones)):
             self.world.drones[name].fails_after_s = rng.uniform(*scenario.fails_s)
         aisle = rng.choice([aisle for aisle in self.site.aisles if aisle.shelves])
@@ -170,7 +183,11 @@ class FleetSimulation:
         self._closing = dict(itertools.pairwise(nodes))
         self.closed_aisle = aisle.id
         self.now_s = 0.0
-        self._unsent: dict[str, list[Action]] = {}
+
+    @property
+    def queue(self) -> WorkQueue:
+        """Of the hub that lives, or lived last."""
+        return self._hubs[-1].queue
 
     def run(self) -> FleetResult:
         """To the end of the hours, or of the work."""
@@ -180,31 +197,41 @@ class FleetSimulation:
         done = 0
         closes = [s.closed_from * end_s, s.closed_to * end_s] if s.closes_aisle else []
         while at_s < end_s:
-            if steps % _HUB_STEPS == 0:
-                now_ms = int(at_s * 1000)
+            if steps % _HUB_STEPS == 0 and (hub := self._hub or self._started(at_s)) is not None:
                 if closes and at_s >= closes[0]:
                     closes.pop(0)
-                    self._close(now_ms, shuts=len(closes) == 1)
-                self._hub(now_ms)
+                    self._close(hub, int(at_s * 1000), shuts=len(closes) == 1)
+                self._step(hub, at_s)
                 if len(self.queue.done) > done:
                     done, last_s = len(self.queue.done), at_s
+            self._kill_broker()
             self.world.step(_STEP_S)
             steps += 1
             at_s = self.now_s = steps * _STEP_S
             drones = list(self.world.drones.values())
             self.judge.see(at_s, drones, work_left=bool(self.queue.open or self.queue.given))
-            left = self.queue.open or self.queue.given or closes
+            left = self.queue.open or self.queue.given or closes or self._hub is None
             if not left and not any(self.world.flies(drone) for drone in drones):
                 break
         return self._result(at_s, last_s)
 
-    def _close(self, now_ms: int, *, shuts: bool) -> None:
+    def _close(self, hub: FleetHub, now_ms: int, *, shuts: bool) -> None:
         if shuts:
-            self.dispatcher.shut(self._closing, f"aisle {self.closed_aisle} is closed", now_ms)
+            hub.shut(self._closing, f"aisle {self.closed_aisle} is closed", now_ms)
         else:
-            self.dispatcher.unshut(self._closing)
+            hub.unshut()
 
-    def _hub(self, now_ms: int) -> None:
+    def _started(self, at_s: float) -> FleetHub | None:
+        """A new hub, once the old one was away for long enough."""
+        if at_s < self._away_until_s:
+            return None
+        self._hub = FleetHub.again(self._plan, self._kept, int(at_s * 1000))
+        self._hubs.append(self._hub)
+        return self._hub
+
+    def _step(self, hub: FleetHub, at_s: float) -> None:
+        """What was decided is kept first (here only where it is needed), then told; of the hubs that are
+        killed, half are between these."""
         linked = [drone for drone in self.world.drones.values() if drone.cut_s <= 0.0]
         reports = [
             DroneReport(
@@ -212,13 +239,24 @@ class FleetSimulation:
             )
             for drone in linked
         ]
-        commands = self.dispatcher.step(now_ms, reports)
-        for name, drone in self.world.drones.items():
-            fresh = self._unsent.pop(name, []) + list(commands.base.get(name, ()))
-            if drone.cut_s > 0.0:
-                self._unsent[name] = fresh
-            else:
-                self.world.tell(name, fresh, paused=name in commands.paused)
+        told = hub.step(int(at_s * 1000), reports)
+        dies = self._kills.random() < self.scenario.hub_kills_per_h * _STEP_S * _HUB_STEPS / 3600.0
+        if dies:
+            self._hub, self._kept = None, hub.keep()
+            self._away_until_s = at_s + self._kills.expovariate(1 / self.scenario.hub_away_s)
+        if dies and self._kills.random() < 0.5:
+            return
+        for drone in linked:
+            one = told[drone.name]
+            self.world.tell(drone.name, one.first, one.base, paused=one.paused)
+
+    def _kill_broker(self) -> None:
+        """Cut all links at once."""
+        if self._kills.random() < self.scenario.broker_kills_per_h * _STEP_S / 3600.0:
+            self._broker_kills += 1
+            away_s = self._kills.expovariate(1 / self.scenario.broker_away_s)
+            for drone in self.world.drones.values():
+                drone.cut_s = max(drone.cut_s, away_s)
 
     def _result(self, at_s: float, last_s: float) -> FleetResult:
         places = {node: len(self.queue.work(node).places) for node in self._nodes()}
@@ -244,7 +282,9 @@ class FleetSimulation:
             sum(drone.flown_s for drone in drones),
             min((drone.least_charge for drone in drones if not drone.failed), default=1.0),
             tuple(drone.name for drone in drones if drone.failed),
-            self.control.replans,
+            sum(hub.control.replans for hub in self._hubs),
+            len(self._hubs) - 1,
+            self._broker_kills,
             self._docks_document(),
         )
 
@@ -253,6 +293,7 @@ class FleetSimulation:
         if not self.docks:
             return {}
         landings = {dock.name: self.world.landings.get(dock.name, (0, 0)) for dock in self.docks}
+        queues = [hub.dispatcher.docks for hub in self._hubs]
         return {
             "docks": [
                 {
@@ -263,9 +304,9 @@ class FleetSimulation:
                 }
                 for dock in self.docks
             ],
-            "waited_for_docks_s": round(self.dispatcher.docks.waited_ms / 1000, 1),
-            "docks_told_count": self.dispatcher.docks.told_count,
-            "docks_told": list(self.dispatcher.docks.told),
+            "waited_for_docks_s": round(sum(queue.waited_ms for queue in queues) / 1000, 1),
+            "docks_told_count": sum(queue.told_count for queue in queues),
+            "docks_told": [line for queue in queues for line in queue.told],
         }
 
     def _nodes(self) -> list[str]:
@@ -290,4 +331,6 @@ def fly_fleet(scenario: FleetScenario) -> FleetResult:
 def alone(scenario: FleetScenario) -> FleetScenario:
     """The same hall and hours for one drone that nothing happens to but its own pace: what a fleet is
     compared with."""
-    return replace(scenario, drones=1, failing=0, closes_aisle=False)
+    return replace(
+        scenario, drones=1, failing=0, closes_aisle=False, hub_kills_per_h=0.0, broker_kills_per_h=0.0
+    )

@@ -106,10 +106,12 @@ class FleetWorld:
         self._locate(drone)
         return drone
 
-    def tell(self, name: str, actions: Iterable[Action], *, paused: bool) -> None:
-        """What the link brings."""
+    def tell(self, name: str, first: int, actions: Sequence[Action], *, paused: bool) -> None:
+        """What the link brings: actions of which the first is number `first` of the drone's life.  What it
+        has of these it does not take twice."""
         drone = self.drones[name]
-        drone.base.extend(actions)
+        known = drone.done + len(drone.base)
+        drone.base.extend(actions[max(known - first, 0) :])
         drone.paused = paused
 
     def step(self, dt_s: float) -> None:
