@@ -97,6 +97,10 @@ class PaperDrone:
         if on_pad:
             self.truth.x_m, self.truth.y_m = self._pad
             self.truth.z_m = 0.0
+        self.welcome()
+
+    def welcome(self) -> None:
+        """A station connects to it."""
         welcome = {"session": f"{self.name} {self._session}", "floor": floor_status(self.site)}
         self._tell(self.name, "welcome", {**welcome, "role": "operator"})
 

@@ -12,6 +12,7 @@ import pytest
 from flightd.core.types import Phase
 from flightd.fleet.traffic.cells import CellSize
 from flightd.fleet.vehicle.drone_factsheet import Measures
+from flightd.ground.fleet.fleet_memory import FleetMemory
 from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.hub import Hub
 from flightd.ground.mqtt.managed_drone import OrderRules
@@ -36,16 +37,44 @@ async def until(condition: Callable[[], Any], within_s: float = 30.0) -> None:
 class PaperFleet:
     """Drones, who flies them, and a judge; as much of a hub as they need."""
 
-    def __init__(self, sites: Mapping[str, Site], hold_s: float = 20.0) -> None:
+    def __init__(
+        self, sites: Mapping[str, Site], hold_s: float = 20.0, memory: FleetMemory | None = None
+    ) -> None:
         self.written: list[tuple[str, str, str, str]] = []
-        self.own = OwnFleet(
-            sites, BODY, OrderRules(hold_s, lambda *line: self.written.append(line)), self.aside
-        )
+        self._sites, self._memory = sites, memory
+        self._rules = OrderRules(hold_s, lambda *line: self.written.append(line))
+        self.own = self._station()
+        self._running: asyncio.Future[None] | None = None
         self.deciding: asyncio.Event | None = None
         """What is decided comes no sooner."""
         self.pages: dict[tuple[str, str], Any] = {}
-        self.drones = {name: PaperDrone(name, site, self.own.tell) for name, site in sites.items()}
+        self.drones = {name: PaperDrone(name, site, self._hear) for name, site in sites.items()}
         self.judge = FleetJudge(CellSize(upright_m=100.0), 0.0)
+
+    def _station(self) -> OwnFleet:
+        return OwnFleet(self._sites, BODY, self._rules, self.aside, self._memory)
+
+    def _hear(self, drone: str, topic: str, value: Any) -> None:
+        self.own.tell(drone, topic, value)
+
+    def start(self) -> None:
+        """The station, from the beginning."""
+        self._running = asyncio.ensure_future(self.own.run(cast(Hub, self)))
+
+    async def kill(self) -> None:
+        """The station dies where it stands; nobody is told to hold."""
+        assert self._running is not None
+        self._running.cancel()
+        await asyncio.wait([self._running])
+        for drone in self.drones.values():
+            drone.on_person = lambda: None
+        self.own = self._station()
+
+    def start_again(self) -> None:
+        """Another station, which connects to all drones."""
+        for drone in self.drones.values():
+            drone.welcome()
+        self.start()
 
     async def aside(self, work: Callable[[], T]) -> T:
         """At once, and what comes of it when a test wants it."""
@@ -76,18 +105,19 @@ class PaperFleet:
     @contextlib.asynccontextmanager
     async def flying(self) -> AsyncIterator[None]:
         """The station runs meanwhile."""
-        hub = cast(Hub, self)
         tasks = [asyncio.ensure_future(drone.run()) for drone in self.drones.values()]
-        tasks += [asyncio.ensure_future(self.watch()), asyncio.ensure_future(self.own.run(hub))]
+        tasks.append(asyncio.ensure_future(self.watch()))
+        self.start()
         try:
             await until(lambda: self.state["flies"])
             yield
             assert self.judge.faults == []
         finally:
-            tasks[-1].cancel()
-            await asyncio.wait(tasks[-1:])
+            assert self._running is not None
+            self._running.cancel()
+            await asyncio.wait([self._running])
             await self.own.leave()
-            for task in tasks[:-1]:
+            for task in tasks:
                 task.cancel()
             await asyncio.wait(tasks)
 
@@ -100,10 +130,14 @@ async def on_way_to(node: str, fleet: PaperFleet) -> None:
 
 
 def fly(
-    go: Callable[[PaperFleet], Coroutine[Any, Any, None]], names: str = "abc", *, counts: bool = False
+    go: Callable[[PaperFleet], Coroutine[Any, Any, None]],
+    names: str = "abc",
+    *,
+    counts: bool = False,
+    memory: FleetMemory | None = None,
 ) -> PaperFleet:
     """Do `go` while the fleet flies."""
-    fleet = PaperFleet({name: hall(name) for name in names})
+    fleet = PaperFleet({name: hall(name) for name in names}, memory=memory)
     for drone in fleet.drones.values():
         drone.counts = counts
 

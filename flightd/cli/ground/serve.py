@@ -212,7 +212,7 @@ def ground(
         at = "" if viewer is None else viewer.url
         hold_s = mqtt_hold if mqtt_orders else None
         link = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones, access, hold_s)
-        own_fleet = _own_fleet(mqtt_body, drones, access, mqtt_hold) if fleet else None
+        own_fleet = _own_fleet(mqtt_body, drones, access, mqtt_hold, state_folder(state)) if fleet else None
         viewers = () if viewer is None else (viewer,)
         hooks = _webhooks(webhook or (), store)
         kept = None if store is None else stack.enter_context(opened(store, evidence))
@@ -297,7 +297,10 @@ def _fleet_link(
     return FleetLink([name for name, _ in drones], broker, of, measures, rules)
 
 
-def _own_fleet(body: str, drones: Sequence[tuple[str, Address]], access: Access, hold_s: float) -> OwnFleet:
+def _own_fleet(
+    body: str, drones: Sequence[tuple[str, Address]], access: Access, hold_s: float, folder: Path
+) -> OwnFleet:
+    from flightd.ground.fleet.fleet_memory import FleetMemory
     from flightd.ground.fleet.own_fleet import TRAFFIC, OwnFleet
     from flightd.ground.mqtt.broker_address import read_body
     from flightd.ground.mqtt.managed_drone import OrderRules
@@ -305,7 +308,8 @@ def _own_fleet(body: str, drones: Sequence[tuple[str, Address]], access: Access,
     def write_down(act: str, drone: str, outcome: str, text: str) -> None:
         access.write_down(TRAFFIC, "", act, drone, outcome=outcome, text=text)
 
-    return OwnFleet([name for name, _ in drones], read_body(body), OrderRules(hold_s, write_down))
+    rules, memory = OrderRules(hold_s, write_down), FleetMemory(folder)
+    return OwnFleet([name for name, _ in drones], read_body(body), rules, memory=memory)
 
 
 def _say_where(foxglove: str, where: Listening) -> None:

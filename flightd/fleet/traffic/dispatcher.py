@@ -83,11 +83,11 @@ class Dispatcher:
         self._avoided: set[str] = set()
         self._heard_ms: dict[str, int] = {}
         self._held: set[str] = set()
+        self._comes_back: set[str] = set()
+        """Those that were taken up in the air: they may be given something to do before they are home."""
         self._tries: dict[str, int] = {}
         self._shut: dict[str, str] = {}
         self._refusals: dict[str, int] = {}
-        self._blamed: dict[str, str] = {}
-        """The reasons of what drones refused: no air that is freed changes them."""
         self.holding = 0
 
     def step(self, now_ms: int, reports: Iterable[DroneReport]) -> Commands:
@@ -138,6 +138,7 @@ class Dispatcher:
         before, next_node = self._near(drone), self._next_of(drone)
         self._held |= set(self.control.roam(drone, place, air, doubt_m, now_ms))
         self._held.discard(drone)
+        self._comes_back.discard(drone)
         self._avoided.discard(drone)
         self._waits_since_ms.pop(drone, None)
         if lost := self._tours.pop(drone, set()):
@@ -148,16 +149,19 @@ class Dispatcher:
         self._settle_tours()
         self._free(before - self._near(drone))
 
-    def readmit(self, drone: str, place: int, pad: int, now_ms: int) -> bool:
+    def readmit(
+        self, drone: str, place: int, pad: int, now_ms: int, holding: Mapping[str, int] | None = None
+    ) -> bool:
         """It is the fleet's again, where it stands or hovers, and comes home to `pad`.  False, with nothing
-        changed, as long as somebody else is to come there."""
-        if not self.control.may_enter(drone, place):
+        changed, as long as somebody else is to come there (`TrafficControl.may_enter`)."""
+        if not self.control.may_enter(drone, place, holding):
             return False
         freed = self._near(drone)
         self.control.enter(drone, place, ends=(pad,))
         self._heard_ms[drone] = now_ms
         if not self.docks.flies_on(drone, pad) and place != pad:
             self._held |= set(self.control.replan([drone], now_ms))
+            self._comes_back.add(drone)
         self._free(freed)
         return True
 
@@ -172,19 +176,13 @@ class Dispatcher:
         tries = self._refusals[node] = self._refusals.get(node, 0) + 1
         if self.queue.work(node).drone or tries >= _TRIES:
             self._refusals.pop(node)
-            self._give_up(node, f"{drone}: {why}")
-
-    def _give_up(self, node: str, reason: str) -> None:
-        self._blamed[node] = reason
-        self.queue.hand_back([node], reason)
+            self.queue.give_up(node, f"{drone}: {why}")
 
     def _free(self, nodes: Collection[str]) -> None:
         """Drones may come there again."""
-        reasons = self.queue.reasons
-        freed = [node for node in nodes if node not in reasons or reasons[node] != self._blamed.get(node)]
         if nodes:
             self._tries.clear()
-        self.queue.retry(freed)
+        self.queue.retry(nodes)
 
     def _hear(self, report: DroneReport, now_ms: int) -> None:
         drone, course = report.drone, self.control.drones[report.drone]
@@ -198,7 +196,7 @@ class Dispatcher:
             node = vertices[vertex].node
             self._tours.get(drone, set()).discard(node)
             if node in report.not_counted:
-                self._give_up(node, f"{drone}: {report.not_counted[node]}")
+                self.queue.give_up(node, f"{drone}: {report.not_counted[node]}")
             else:
                 self.queue.finish(node)
         if course.failed:
@@ -358,8 +356,12 @@ class Dispatcher:
     def _may_begin(self, drone: str) -> bool:
         """Whether a drone has nothing to do, and a battery to do something."""
         course = self.control.drones[drone]
-        idle = not course.ahead and not course.failed and course.doubt_m <= 0.0
-        return idle and drone not in self._held and self._charge.get(drone, 0.0) >= self._endurance.starts_at
+        if course.failed or course.doubt_m > 0.0 or drone in self._held:
+            return False
+        if drone in self._comes_back and drone in self._charge:
+            self._comes_back.discard(drone)
+            return bool(course.ahead)
+        return not course.ahead and self._charge.get(drone, 0.0) >= self._endurance.starts_at
 
     def _give_tour(self, drone: str, now_ms: int, most: int) -> bool:
         course, home = self.control.drones[drone], self.docks.home(drone)

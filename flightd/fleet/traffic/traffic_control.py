@@ -53,11 +53,17 @@ class TrafficControl:
         self._avoided.pop(drone, None)
         self._rebuild()
 
-    def may_enter(self, drone: str, place: int) -> bool:
-        """Whether nobody else is, or is to come, where the drone would stand."""
+    def may_enter(self, drone: str, place: int, holding: Mapping[str, int] | None = None) -> bool:
+        """Whether nobody else is, or is to come, where the drone would stand.  `holding` are those that do
+        not fly by this traffic yet, but stand where it can fly them on from, each on a vertex."""
         near = set(self.conflicts[place])
+        holding = holding or {}
         for other, course in self.drones.items():
-            taken = course.wreck or {course.place, *(a.resource for a in course.ahead), *_ends_of(course)}
+            if course.roams and other in holding:
+                taken: Collection[int] = {holding[other]}
+            else:
+                ahead = (action.resource for action in course.ahead)
+                taken = course.wreck or {course.place, *ahead, *_ends_of(course)}
             if other != drone and not near.isdisjoint(taken):
                 return False
         return True

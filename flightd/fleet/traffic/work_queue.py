@@ -54,6 +54,7 @@ class KeptWork:
     work: tuple[NodeWork, ...]
     done: tuple[str, ...]
     reasons: Mapping[str, str]
+    given_up: tuple[str, ...] = ()
 
 
 class WorkQueue:
@@ -65,19 +66,22 @@ class WorkQueue:
         self._given: dict[str, str] = {}
         self.done: list[str] = []
         self.reasons: dict[str, str] = {}
+        self._given_up: set[str] = set()
 
     @classmethod
     def of(cls, kept: KeptWork) -> WorkQueue:
         """Go on with it; what drones were given waits again."""
         queue = cls(kept.work)
         queue.done, queue.reasons = list(kept.done), dict(kept.reasons)
+        queue._given_up = set(kept.given_up)
         for node in (*kept.done, *kept.reasons):
             queue._open.pop(node, None)
         return queue
 
     def kept(self) -> KeptWork:
         """As it is to be kept."""
-        return KeptWork(tuple(self._work.values()), tuple(self.done), dict(self.reasons))
+        given_up = tuple(sorted(self._given_up))
+        return KeptWork(tuple(self._work.values()), tuple(self.done), dict(self.reasons), given_up)
 
     def work(self, node: str) -> NodeWork:
         """KeyError for a node without work."""
@@ -98,6 +102,7 @@ class WorkQueue:
         for each in work:
             self._work[each.node] = each
             self.reasons.pop(each.node, None)
+            self._given_up.discard(each.node)
             if each.node in self.done:
                 self.done.remove(each.node)
             if each.node not in self._given:
@@ -110,6 +115,7 @@ class WorkQueue:
         self._given.pop(node, None)
         self._open.pop(node, None)
         self.reasons.pop(node, None)
+        self._given_up.discard(node)
         if node not in self.done:
             self.done.append(node)
 
@@ -123,10 +129,15 @@ class WorkQueue:
             else:
                 self._open[node] = None
 
+    def give_up(self, node: str, reason: str) -> None:
+        """It is not to be done, whatever becomes free, until it is asked for again."""
+        self.hand_back([node], reason)
+        self._given_up.add(node)
+
     def retry(self, nodes: Iterable[str]) -> None:
         """What was not to be done may be done now."""
         for node in nodes:
-            if self.reasons.pop(node, None) is not None:
+            if node not in self._given_up and self.reasons.pop(node, None) is not None:
                 self._open[node] = None
 
     def take(self, drone: str, nodes: Iterable[str]) -> None:

@@ -7,11 +7,26 @@ drone rests on its own pad at the end of a flight, when a person gives it back, 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import OVER, Phase
 from flightd.ground.fleet.fleet_floor import FleetFloor
 from flightd.ground.mqtt.order_flight import WAITS
+
+
+@dataclass(frozen=True, slots=True)
+class KeptAir:
+    """What of `DroneAir` outlives the station."""
+
+    place: int
+    closed: frozenset[int]
+    doubt_m: float
+    rests: bool
+    is_astray: bool
+    is_believed: bool | None
+    flew: bool
+    at: tuple[float, float] | None
 
 
 class DroneAir:
@@ -36,6 +51,29 @@ class DroneAir:
         self._armed = self._flew = False
         self._at: tuple[float, float] | None = None
         """Told last while armed: a drone on the ground tells none."""
+
+    def kept(self) -> KeptAir:
+        """What the next station has to know of it."""
+        return KeptAir(
+            self.place,
+            self.closed,
+            self.doubt_m,
+            self.rests,
+            self.is_astray,
+            self.is_believed,
+            self._flew,
+            self._at,
+        )
+
+    def recall(self, session: str, kept: KeptAir, ways: Sequence[Sequence[str]]) -> None:
+        """Go on with what the station before knew of it in that session; it may be on these ways since."""
+        self._session = session
+        self.place, self.closed, self.doubt_m = kept.place, kept.closed, kept.doubt_m
+        self.rests, self.is_astray, self.is_believed = kept.rests, kept.is_astray, kept.is_believed
+        self._flew, self._at = kept.flew, kept.at
+        if any(ways):
+            self.rests = False
+        self.close(ways, kept.doubt_m)
 
     def see(self, status: StatusReport | None, *, stood: bool, ordered: bool) -> None:
         """What it told last; `stood`: in this session it told where it stands; `ordered`: it is silent, and

@@ -21,6 +21,7 @@ from flightd.fleet.vehicle.signals import Decided
 from flightd.ground.fleet.base_orders import BaseOrders, instant, scan
 from flightd.ground.fleet.drone_air import DroneAir
 from flightd.ground.fleet.fleet_floor import FleetFloor, OwnPad
+from flightd.ground.fleet.fleet_memory import KeptDrone
 from flightd.ground.mqtt.managed_drone import ManagedDrone
 from flightd.ground.mqtt.order_flight import WAITS
 from flightd.ground.mqtt.safe_return import Standing
@@ -252,6 +253,24 @@ class FleetDrone:
 
     def _node_of(self, step: _Step) -> str:
         return self._floor.lanes.vertices[step.action.vertex].node
+
+    # what outlives the station
+
+    def kept(self, released: Sequence[Action] = ()) -> KeptDrone:
+        """What the next station has to know, with what it is about to be ordered."""
+        status, vehicle = self.drone.status, self.drone.vehicle
+        base = [self._node_of(step) for step in (*self._base, *map(_Step, released))]
+        told = () if status is None else status.way
+        ways = (base, (vehicle.last_node, *vehicle.ahead), told) if base or not self.air.rests else ()
+        known = tuple(tuple(node for node in way if node) for way in ways)
+        return KeptDrone(self.drone.kept(), self.air.kept(), tuple(way for way in known if way))
+
+    def recall(self, kept: KeptDrone) -> None:
+        """Go on with what the station before knew."""
+        nodes = {node for way in kept.ways for node in way}
+        self.drone.recall(kept.session, nodes)
+        self.air.recall(kept.session.session, kept.air, kept.ways)
+        self._was_taken = kept.session.taken
 
     # what it is told
 

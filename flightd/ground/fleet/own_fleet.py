@@ -7,7 +7,7 @@ import asyncio
 import logging
 import math
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -21,6 +21,7 @@ from flightd.ground.access.roles import Identity, Role
 from flightd.ground.fleet.base_orders import VERSION
 from flightd.ground.fleet.fleet_drone import FleetDrone
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor
+from flightd.ground.fleet.fleet_memory import FleetMemory, KeptDrone, KeptFloor
 from flightd.ground.fleet.station_traffic import Aside, StationTraffic, pace_of
 from flightd.ground.hub import Hub
 from flightd.ground.messages import Act
@@ -48,7 +49,11 @@ class OwnFleet(VehicleSides):
         measures: Measures,
         rules: OrderRules,
         aside: Aside = asyncio.to_thread,
+        memory: FleetMemory | None = None,
     ) -> None:
+        self._memory = memory
+        self._forgets = False
+        """What it should write down cannot be written: told once."""
         self._cell = CellSize(body_m=max(measures.length_m, measures.width_m), upright_m=WHOLE_AIR_M)
         super().__init__({name: ManagedDrone(name, VERSION, measures, rules) for name in drones})
         for drone in self._drones.values():
@@ -62,6 +67,23 @@ class OwnFleet(VehicleSides):
         """The maps by which it was last tried to fly them."""
         self._trouble = ""
         self._hub: Hub | None = None
+        self._told: dict[tuple[str, str], Any] | None = {}
+        """What drones tell before it is known what the station before knew of them; newest of each topic."""
+
+    def tell(self, drone: str, topic: str, value: Any) -> None:
+        """As `hub.Viewer`."""
+        if self._told is None:
+            super().tell(drone, topic, value)
+        else:
+            self._told[drone, topic] = value
+
+    def _hear_all(self) -> None:
+        """What they told meanwhile: who they are first, then what they did, then how they are."""
+        told, self._told = self._told or {}, None
+        for wanted in ("welcome", "events", "status", "link"):
+            for (drone, topic), value in told.items():
+                if topic == wanted:
+                    self.tell(drone, topic, value)
 
     async def run(self, hub: Hub) -> None:
         """Fly them until cancelled."""
@@ -96,6 +118,10 @@ class OwnFleet(VehicleSides):
 
     async def _control(self) -> None:
         loop = asyncio.get_running_loop()
+        try:
+            await self._recall()
+        finally:
+            self._hear_all()
         while True:
             try:
                 await self._assemble()
@@ -122,9 +148,53 @@ class OwnFleet(VehicleSides):
         elif not self._traffic.is_outdated:
             self._trouble = ""
 
+    async def _recall(self) -> None:
+        """Go on where the station before was ended, if it flew the same drones."""
+        try:
+            known = None if self._memory is None else await self._aside(self._memory.read)
+            if known is None:
+                return
+            floor, fleet = known
+            self._queue = WorkQueue.of(fleet.work)
+            if {*fleet.drones} != {*self._drones} or {*floor.floors} != {*self._drones}:
+                _LOG.warning("the fleet had other drones before: it flies once all told where they stand")
+                return
+            stands = {name: standing.node for name, standing in floor.standings.items()}
+            made = await self._aside(partial(FleetFloor, floor.floors, stands, self._cell))
+        except FlightdError as err:
+            _LOG.warning("what the station before knew of its fleet is not used: %s", err)
+            return
+        self._compared = dict(floor.floors)
+        drones = self._drones_on(made)
+        for name, drone in drones.items():
+            drone.recall(fleet.drones[name])
+        await self._begin(made, drones, pace_of(floor.standings.values()))
+
+    def _drones_on(self, floor: FleetFloor) -> dict[str, FleetDrone]:
+        return {
+            name: FleetDrone(name, drone, floor, self._cell.uncertainty_m)
+            for name, drone in self._drones.items()
+        }
+
+    async def _keep_in_mind(self, drones: Mapping[str, KeptDrone], queue: WorkQueue) -> None:
+        waits = bool(queue.open or queue.given)
+        await self._write(lambda memory: memory.keep(drones, queue.kept(), waits=waits))
+
+    async def _write(self, what: Callable[[FleetMemory], None]) -> None:
+        """Flights go on where the disk refuses: what is lost then is lost with the station alone."""
+        if self._memory is None:
+            return
+        try:
+            await self._aside(partial(what, self._memory))
+            self._forgets = False
+        except FlightdError as err:
+            if not self._forgets:
+                _LOG.warning("the fleet's flights are not written down: %s", err)
+            self._forgets = True
+
     async def _begin(self, floor: FleetFloor, drones: Mapping[str, FleetDrone], pace: Pace) -> None:
         self._traffic, self._fleet = None, (floor, drones, pace)
-        made = partial(StationTraffic, floor, drones, pace, self._cell, self._queue)
+        made = partial(StationTraffic, floor, drones, pace, self._cell, self._queue, self._keep_in_mind)
         self._traffic, self._trouble = await self._aside(made), ""
 
     @property
@@ -152,11 +222,9 @@ class OwnFleet(VehicleSides):
                 )
             self._trouble = str(err)
             return
-        drones = {
-            name: FleetDrone(name, drone, floor, self._cell.uncertainty_m)
-            for name, drone in self._drones.items()
-        }
-        await self._begin(floor, drones, pace_of(standings.values()))
+        kept = KeptFloor(floors, standings)
+        await self._write(lambda memory: memory.begin(kept))
+        await self._begin(floor, self._drones_on(floor), pace_of(standings.values()))
 
     # what is asked of it
 

@@ -20,6 +20,7 @@ from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.traffic.work_queue import NodeWork, Value, WorkQueue
 from flightd.ground.fleet.fleet_drone import FLIGHT_S, RESERVE, FleetDrone
 from flightd.ground.fleet.fleet_floor import HEIGHT_M, FleetFloor
+from flightd.ground.fleet.fleet_memory import KeptDrone
 from flightd.ground.fleet.traffic_view import TrafficView
 from flightd.ground.mqtt.safe_return import Standing
 from flightd.mission.plan.leg_times import Pace
@@ -63,6 +64,14 @@ class _Decided:
     back: frozenset[str]
 
 
+Keep: TypeAlias = Callable[[Mapping[str, KeptDrone], WorkQueue], Awaitable[None]]
+"""Writes down how drones and work are, before anything is ordered by it."""
+
+
+async def _keep_nothing(drones: Mapping[str, KeptDrone], queue: WorkQueue) -> None:
+    """Nothing of it outlives the station."""
+
+
 class Aside(Protocol):
     """Does a piece of work that takes a while, beside the loop."""
 
@@ -80,7 +89,9 @@ class StationTraffic:
         pace: Pace,
         cell: CellSize,
         queue: WorkQueue,
+        keep: Keep = _keep_nothing,
     ) -> None:
+        self._keep = keep
         self._floor = floor
         self._drones = drones
         self._control = TrafficControl(floor.lanes, pace, cell)
@@ -140,8 +151,14 @@ class StationTraffic:
         finally:
             self._decides = False
             self._take_asked()
+        await self._keep_what(decided)
         for name, drone in self._drones.items():
             self._act(name, drone, seen[name], decided, now_ms / 1000)
+
+    async def _keep_what(self, decided: _Decided) -> None:
+        """Before it is ordered."""
+        kept = {name: drone.kept(decided.base.get(name, ())) for name, drone in self._drones.items()}
+        await self._keep(kept, self._queue)
 
     def _see(self, name: str, drone: FleetDrone) -> _Seen:
         drone.look()
@@ -156,6 +173,7 @@ class StationTraffic:
     def _decide(self, seen: Mapping[str, _Seen], now_ms: int) -> _Decided:
         """Keep others out of the air of those that traffic does not fly until each rests, and fly it on
         then; send on the others."""
+        holding = {name: one.rests_at for name, one in seen.items() if one.rests_at is not None}
         clear: dict[str, bool] = {}
         back: set[str] = set()
         for name, one in seen.items():
@@ -166,7 +184,9 @@ class StationTraffic:
                 self._dispatcher.withdraw(name, *one.air, now_ms, one.refused)
             clear[name] = self._control.is_clear(name, one.way_home)
             pad = self._floor.pad(name)
-            if one.rests_at is not None and self._dispatcher.readmit(name, one.rests_at, pad, now_ms):
+            if one.rests_at is not None and self._dispatcher.readmit(
+                name, one.rests_at, pad, now_ms, holding
+            ):
                 del self._airs[name]
                 back.add(name)
         reports = [seen[name].report for name in sorted(seen)]

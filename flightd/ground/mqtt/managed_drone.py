@@ -11,8 +11,8 @@ import asyncio
 import logging
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Final
 
@@ -43,6 +43,7 @@ from flightd.fleet.vehicle.signals import (
 )
 from flightd.ground.drone_link import DroneLink
 from flightd.ground.messages import Act, LinkState
+from flightd.ground.mqtt.kept_session import KeptSession, StationBefore
 from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
 from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
 from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
@@ -133,6 +134,24 @@ class ManagedDrone:
         self._planned: tuple[str, tuple[str, ...]] | None = None
         self._trouble: tuple[ErrorType, str] | None = None
         self._rests_since_s: float | None = None
+        self._before = StationBefore()
+
+    # what outlives the station
+
+    def kept(self) -> KeptSession:
+        """What the next station has to know of the drone's session."""
+        session = "" if self._welcome is None else str(self._welcome["session"])
+        seq = self._event_seq or 0
+        if not session:  # not heard by this station
+            return replace(self._before.kept, taken=self._taken)
+        return KeptSession(session, tuple(self._plans), self._standing, seq, self._taken)
+
+    def recall(self, kept: KeptSession, ordered: Collection[str]) -> None:
+        """Go on with what the station before knew, before anything is heard: it flies by that one's plans,
+        and was ordered over these nodes at last.  If it has another session by then nothing of this holds
+        but that a person has it."""
+        self.taken_by_person(kept.taken)
+        self._before.recall(kept, ordered)
 
     # what comes in
 
@@ -204,6 +223,9 @@ class ManagedDrone:
         self._asked_at_s = -_ASK_AGAIN_S
         self._return = SafeReturn()
         self._sent.clear()
+        if kept := self._before.greet(str(welcome["session"])):
+            self._plans.extend(kept.plans)
+            self._standing, self._event_seq = kept.standing, kept.event_seq
 
     def _take_events(self, events: Iterable[EventReport]) -> None:
         """Commands that are none of ours are a person's; those before the first that is heard are past."""
@@ -213,6 +235,7 @@ class ManagedDrone:
                 self._take_event(event)
             self._event_seq = max(self._event_seq or 0, event.seq)
         self._event_seq = self._event_seq or 0
+        self._before.is_past()
 
     def _take_event(self, event: EventReport) -> None:
         if event.name == "visited":
@@ -223,7 +246,7 @@ class ManagedDrone:
             self._trouble = (ErrorType.NODE_UNREACHABLE, event.text) if refused else self._trouble
         is_command = event.name == "command" and event.level is EventLevel.INFO
         is_command = is_command and event.text.split(" ")[0] in _COMMANDS
-        if is_command and not self._sent.take(event):
+        if is_command and not self._before.gave(event.text) and not self._sent.take(event):
             self.taken_by_person()
 
     # what goes on
@@ -269,7 +292,8 @@ class ManagedDrone:
             self._take_output(one, status)
         self._ahead = list(self.vehicle.ahead)
         self.is_automatic = mode is OperatingMode.AUTOMATIC
-        if self.is_automatic and self._link is not None:
+        self._before.see(status)
+        if self.is_automatic and self._link is not None and not self._before.flies_on:
             self._go_on(status, now_s, tasks, self._link)
 
     def _mode(self, status: StatusReport) -> OperatingMode:

@@ -1,0 +1,137 @@
+"""What a station keeps of its fleet, so that one that is started anew in the middle of flights goes on.
+
+A file of the station's own.  What drones are released to stands in it before they are ordered there, so that
+air in which one may be is known as such whatever becomes of the station.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final, TypeVar
+
+import msgspec
+
+from flightd import __version__
+from flightd.adapters.ground_link.messages.floor import FloorStatus
+from flightd.core.errors import InputError
+from flightd.fleet.traffic.work_queue import KeptWork
+from flightd.ground.fleet.drone_air import KeptAir
+from flightd.ground.mqtt.kept_session import KeptSession
+from flightd.ground.mqtt.safe_return import Standing
+from flightd.ground.own_database import OwnDatabase
+
+FILE: Final = "fleet.db"
+_APPLICATION, _VERSION = 0x666C666C, 1
+"""`flfl`: SQLite's application id, so that another program's file is told apart."""
+_SCHEMA = "CREATE TABLE kept (name TEXT PRIMARY KEY, json BLOB NOT NULL) STRICT"
+_WORK_LASTS_S: Final = 600.0
+"""Nobody expects drones to leave for work that was asked for longer before the station began again."""
+_TELLS_S: Final = 60.0
+TOO_OLD: Final = "the station was away for too long: ask for it again"
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class KeptDrone:
+    """One drone: `ways` are those that it may fly, over nodes, by what it was released to and told."""
+
+    session: KeptSession
+    air: KeptAir
+    ways: tuple[tuple[str, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class KeptFloor:
+    """By which maps the fleet flies, and what the drones told where they stood; which flightd wrote it, for
+    another one may call the air otherwise."""
+
+    floors: Mapping[str, FloorStatus]
+    standings: Mapping[str, Standing]
+    version: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class KeptFleet:
+    """The drones and the work; `utc_s` is when."""
+
+    drones: Mapping[str, KeptDrone]
+    work: KeptWork
+    utc_s: float = 0.0
+
+
+class FleetMemory:
+    """`fleet.db` in `folder`.  Safe from any thread; each change is whole or none.  UnavailableError where
+    the disk refuses, InputError for a file that is none of a station's, or cannot be read."""
+
+    def __init__(self, folder: Path, utc_s: Callable[[], float] = time.time) -> None:
+        self._database = OwnDatabase(
+            file=folder / FILE,
+            holds="the fleet's flights",
+            application=_APPLICATION,
+            version=_VERSION,
+            schema=_SCHEMA,
+        )
+        self._utc_s = utc_s
+        self._newest: object = None
+
+    def begin(self, floor: KeptFloor) -> None:
+        """The fleet flies by these maps from now on; nothing of before is left."""
+        self._newest = None
+        with self._database.changed() as kept:
+            kept.execute("DELETE FROM kept")
+            _put(kept, "floor", replace(floor, version=__version__))
+
+    def keep(self, drones: Mapping[str, KeptDrone], work: KeptWork, *, waits: bool) -> None:
+        """Write down how they are, where that changes what the next station has to know; while work `waits`,
+        every minute."""
+        utc_s = self._utc_s()
+        newest = {name: _of_note(drone) for name, drone in drones.items()}, work, waits and utc_s // _TELLS_S
+        if newest != self._newest:
+            with self._database.changed() as kept:
+                _put(kept, "fleet", KeptFleet(drones, work, utc_s))
+            self._newest = newest
+
+    def read(self) -> tuple[KeptFloor, KeptFleet] | None:
+        """What the station before knew; None where none flew a fleet.  Work that waited too long is told as
+        not done."""
+        if not self._database.file.exists():
+            return None
+        with self._database.opened() as kept:
+            floor, fleet = _get(kept, "floor", KeptFloor), _get(kept, "fleet", KeptFleet)
+        if floor is None or fleet is None:
+            return None
+        if floor.version != __version__:
+            raise InputError(
+                f"{self._database.file}: another flightd wrote it, {floor.version or 'of before'}"
+            )
+        if not 0.0 <= self._utc_s() - fleet.utc_s <= _WORK_LASTS_S:
+            over = {*fleet.work.done, *fleet.work.reasons}
+            late = {work.node: TOO_OLD for work in fleet.work.work if work.node not in over}
+            reasons, given_up = {**fleet.work.reasons, **late}, (*fleet.work.given_up, *late)
+            fleet = replace(fleet, work=replace(fleet.work, reasons=reasons, given_up=given_up))
+        return floor, fleet
+
+
+def _of_note(drone: KeptDrone) -> object:
+    """All but what it tells all the time, and tells again."""
+    return replace(
+        drone,
+        session=replace(drone.session, event_seq=0),
+        air=replace(drone.air, at=None, doubt_m=0.0, place=0),
+    )
+
+
+def _put(kept: sqlite3.Connection, name: str, value: object) -> None:
+    kept.execute("INSERT OR REPLACE INTO kept VALUES (?, ?)", (name, msgspec.json.encode(value)))
+
+
+def _get(kept: sqlite3.Connection, name: str, kind: type[_T]) -> _T | None:
+    row = kept.execute("SELECT json FROM kept WHERE name = ?", (name,)).fetchone()
+    try:
+        return None if row is None else msgspec.json.decode(row[0], type=kind)
+    except msgspec.MsgspecError as err:
+        raise sqlite3.DatabaseError(f"what it says of the {name} cannot be read: {err}") from None

@@ -1,0 +1,191 @@
+"""A station that flies a fleet dies in the middle of it, and another one goes on: on paper."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from flightd.core.types import CommandKind, Phase
+from flightd.ground.fleet.fleet_memory import FILE, TOO_OLD, FleetMemory
+from flightd.ground.messages import Act
+from tests.rigs.paper_fleet import PaperFleet, fly, on_way_to, until
+
+_RESTS = {Phase.DONE, Phase.PREFLIGHT}
+
+
+async def until_done(fleet: PaperFleet, nodes: str) -> None:
+    """All these nodes; who was seen to be done with its flight is made ready for the next one."""
+    wanted = set(nodes.split())
+    for _ in range(400):
+        await asyncio.sleep(1.0)
+        if set(fleet.state["done"]) == wanted and at_rest(fleet):
+            return
+        for name, drone in fleet.drones.items():
+            if drone.phase is Phase.DONE and not fleet.flown(name):
+                drone.begin_anew()
+    pytest.fail(f"done are {fleet.state['done']}")
+
+
+def at_rest(fleet: PaperFleet) -> bool:
+    return all(drone.phase in _RESTS for drone in fleet.drones.values())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_next_station_flies_on_who_is_in_the_air_and_what_was_asked_for(
+    tmp_path: Path, seed: int
+) -> None:
+    rng = random.Random(seed)
+
+    async def go(fleet: PaperFleet) -> None:
+        fleet.own.ask(["A3", "A4", "B3", "B4"])
+        for _ in range(3):
+            await asyncio.sleep(rng.uniform(2.0, 25.0))
+            await fleet.kill()
+            await asyncio.sleep(rng.uniform(0.1, 20.0))
+            fleet.start_again()
+        await until_done(fleet, "A3 A4 B3 B4")
+
+    fleet = fly(go, memory=FleetMemory(tmp_path))
+    assert all("home" not in drone.commands for drone in fleet.drones.values()), "traffic brought them home"
+    assert {drone.truth.z_m for drone in fleet.drones.values()} == {0.0}
+
+
+def test_without_a_memory_nobody_is_flown_until_all_are_on_the_ground() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        await on_way_to("B3", fleet)
+        await fleet.kill()
+        fleet.start_again()
+        await asyncio.sleep(60.0)
+        assert not fleet.state["flies"]
+        assert fleet.drones["b"].phase is Phase.HOLD
+        fleet.drones["b"].turn_home()
+        await until(lambda: fleet.drones["b"].phase is Phase.DONE, 100)
+
+    fly(go)
+
+
+def test_what_is_ordered_stands_in_the_memory_before(tmp_path: Path) -> None:
+    memory = FleetMemory(tmp_path)
+    ordered: list[str] = []
+
+    async def go(fleet: PaperFleet) -> None:
+        for drone in fleet.drones.values():
+            act = drone.act
+
+            async def watched(order: Act, *, by_person: bool = True, drone=drone, act=act):  # type: ignore[no-untyped-def]
+                known = memory.read()
+                assert known is not None
+                if order.command is CommandKind.GOTO:
+                    ordered.append(order.node)
+                    assert any(order.node in way for way in known[1].drones[drone.name].ways)
+                return await act(order, by_person=by_person)
+
+            drone.act = watched  # type: ignore[assignment, method-assign]
+        fleet.own.ask(["A3", "B4"])
+        await until(lambda: len(fleet.state["done"]) == 2 and at_rest(fleet), 300)
+
+    fly(go, memory=memory)
+    assert len(ordered) > 4
+
+
+@pytest.mark.parametrize("while_away", [False, True])
+def test_whom_a_person_took_stays_his(tmp_path: Path, while_away: bool) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        await on_way_to("B3", fleet)
+        if not while_away:
+            await b.act(Act("by-ann-1", CommandKind.PAUSE))
+            await until(lambda: not fleet.flown("b"))
+        await fleet.kill()
+        if while_away:
+            await b.act(Act("by-ann-1", CommandKind.PAUSE))
+        fleet.start_again()
+        await until(lambda: fleet.state["flies"])
+        await until(lambda: fleet.state["drones"]["b"]["why"] == "a person has it")
+        assert fleet.pages["b", "manager"] == {"flies": False}
+        commands = len(b.commands)
+        fleet.own.ask(["B3"], "c")
+        await asyncio.sleep(90.0)
+        assert len(b.commands) == commands, "nothing was sent to it"
+        assert fleet.state["done"] == [], "nobody flew into its air"
+        b.turn_home()
+        await until(lambda: b.phase is Phase.DONE, 200)
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
+def test_who_is_silent_when_the_next_station_begins_has_his_air_to_himself(tmp_path: Path) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        await on_way_to("B3", fleet)
+        b.heard = False
+        await fleet.kill()
+        for name in "ac":
+            fleet.drones[name].welcome()
+        fleet.start()  # b does not answer
+        await until(lambda: fleet.state["flies"])
+        fleet.own.ask(["B2"], "c")
+        await asyncio.sleep(60.0)
+        assert fleet.state["done"] == []
+        b.heard = True
+        b.welcome()
+        await until_done(fleet, "B2 B3")
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
+def test_work_that_waited_for_long_is_not_flown_by_a_station_that_nobody_expects_to(tmp_path: Path) -> None:
+    now_s = 1_000_000.0
+
+    async def go(fleet: PaperFleet) -> None:
+        nonlocal now_s
+        for drone in fleet.drones.values():
+            drone.never_starts = True
+        fleet.own.ask(["A3"])
+        await asyncio.sleep(5.0)
+        await fleet.kill()
+        now_s += 3600.0
+        for drone in fleet.drones.values():
+            drone.never_starts = False
+        fleet.start_again()
+        await until(lambda: fleet.state["flies"])
+        await asyncio.sleep(30.0)
+        assert fleet.state["not_done"] == {"A3": TOO_OLD}
+        assert {drone.phase for drone in fleet.drones.values()} == {Phase.PREFLIGHT}
+        fleet.own.ask(["A3"])
+        await until(lambda: fleet.state["done"] == ["A3"], 200)
+
+    fly(go, memory=FleetMemory(tmp_path, lambda: now_s))
+
+
+_SPOILT = {
+    "another version": "UPDATE kept SET json = CAST(replace(json, 'version', 'older') AS BLOB)",
+    "not readable": "UPDATE kept SET json = x'7B7D' WHERE name = 'fleet'",
+}
+
+
+@pytest.mark.parametrize("what", ["not a database", "other drones", *_SPOILT])
+def test_a_memory_that_is_of_no_use_is_told_and_the_fleet_begins_on_the_ground(
+    tmp_path: Path, what: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    def flown(names: str) -> None:
+        async def go(fleet: PaperFleet) -> None:
+            fleet.own.ask(["A3"])
+            await until(lambda: fleet.state["done"] == ["A3"], 200)
+
+        fly(go, names, memory=FleetMemory(tmp_path))
+
+    if what == "not a database":
+        (tmp_path / FILE).write_text("something else, of no use to a station at all")
+    else:
+        flown("ab" if what == "other drones" else "abc")
+        with sqlite3.connect(tmp_path / FILE) as kept:
+            kept.execute(_SPOILT.get(what, "SELECT 1"))
+    caplog.clear()
+    flown("abc")
+    told = [record.message for record in caplog.records if "before" in record.message]
+    assert len(told) == 1, told
