@@ -38,7 +38,7 @@ def test_a_fleet_in_trouble_counts_every_place_or_says_why_not(seed: int) -> Non
 def test_stations_that_are_killed_again_and_again_let_nobody_meet_and_lose_nothing(contacts: int) -> None:
     result = fly_fleet(replace(SMALL, contacts=contacts, hub_kills_per_h=40.0, broker_kills_per_h=20.0))
     assert result.judge.faults == []
-    assert result.hub_kills > 20
+    assert result.hub_kills > 10
     assert result.broker_kills > 5
     assert result.failed
     assert 0 < result.places - result.counted <= 16 * len(result.reasons)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from flightd.adapters.ground_link.client import Address
-from flightd.config.schema import load_config
+from flightd.config.schema import Config, load_config
 from flightd.core.types import Phase
 from flightd.fleet.traffic.cells import CellSize
 from flightd.fleet.vehicle.drone_factsheet import Measures
@@ -32,13 +32,12 @@ _RESTS = frozenset({Phase.PREFLIGHT, Phase.HOLD, Phase.DONE})
 BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
 
 
-class Fleet:
-    """The drones, a station that flies them, and a judge who knows where they are."""
+class Watched:
+    """The drones, and a judge who knows where they are."""
 
-    def __init__(self, flights: dict[str, LiveFlight], station: Station, speed: float) -> None:
+    def __init__(self, flights: dict[str, LiveFlight], speed: float) -> None:
         self._speed = speed
         self.flights = flights
-        self.station = station
         self.judge = FleetJudge(CellSize(upright_m=100.0), 0.0)
         self.passed: dict[str, set[str]] = {name: set() for name in flights}
         """Nodes over which each really was."""
@@ -65,6 +64,14 @@ class Fleet:
                     }
             self.judge.see(loop.time(), seen, work_left=False)
             await asyncio.sleep(_LOOK_S)
+
+
+class Fleet(Watched):
+    """The same, and a station that flies them."""
+
+    def __init__(self, flights: dict[str, LiveFlight], station: Station, speed: float) -> None:
+        super().__init__(flights, speed)
+        self.station = station
 
     async def ask(self, method: str, path: str, told: Any = None) -> tuple[int, dict[str, Any]]:
         """The station's answer."""
@@ -101,7 +108,7 @@ async def flown(
 
 
 @contextlib.contextmanager
-def waiting(names: Sequence[str]) -> Iterator[dict[str, LiveFlight]]:
+def waiting(names: Sequence[str], config: Config = CONFIG) -> Iterator[dict[str, LiveFlight]]:
     """The drones, on their pads."""
     with contextlib.ExitStack() as stack:
-        yield {name: stack.enter_context(LiveFlight(hall(name), CONFIG, speed=1.0)) for name in names}
+        yield {name: stack.enter_context(LiveFlight(hall(name), config, speed=1.0)) for name in names}

@@ -84,7 +84,7 @@ class Dispatcher:
         self._heard_ms: dict[str, int] = {}
         self._held: set[str] = set()
         self._comes_back: set[str] = set()
-        """Those that were taken up in the air: they may be given something to do before they are home."""
+        """Those that were taken up in the air, and have told nothing since."""
         self._tries: dict[str, int] = {}
         self._shut: dict[str, str] = {}
         self._refusals: dict[str, int] = {}
@@ -101,6 +101,7 @@ class Dispatcher:
         if now_ms >= self._next_try_ms.get("urgent", 0):
             self._next_try_ms["urgent"] = now_ms + _RETRY_MS
             self._bring_home(now_ms)
+        self._fly_on(now_ms)
         self._give_tours(now_ms)
         self._fill_batteries(now_ms)
         return Commands(self.control.release(now_ms, self._comes_home), self.control.paused())
@@ -160,7 +161,6 @@ class Dispatcher:
         self.control.enter(drone, place, ends=(pad,))
         self._heard_ms[drone] = now_ms
         if not self.docks.flies_on(drone, pad) and place != pad:
-            self._held |= set(self.control.replan([drone], now_ms))
             self._comes_back.add(drone)
         self._free(freed)
         return True
@@ -341,6 +341,19 @@ class Dispatcher:
             self.holding += 1
             self._replanned(held, now_ms)
 
+    def _fly_on(self, now_ms: int) -> None:
+        """Those that were taken up in the air: with something to do, as far as their batteries last, or
+        home."""
+        shared = math.ceil(len(self.queue.open) / len(self.control.drones))
+        for drone in sorted(self._comes_back & self._charge.keys()):
+            if self.control.drones[drone].doubt_m > 0.0:
+                continue
+            self._comes_back.discard(drone)
+            most = min(shared, MOST_OF_TOUR) if self._shares else MOST_OF_TOUR
+            may_work = bool(self.queue.open) and now_ms >= self._next_try_ms.get(drone, 0)
+            if not (may_work and self._give_tour(drone, now_ms, most)):
+                self._held |= set(self.control.replan([drone], now_ms))
+
     def _give_tours(self, now_ms: int) -> None:
         ready = [drone for drone in self.control.drones if self._may_begin(drone)]
         for i, drone in enumerate(ready):
@@ -356,12 +369,9 @@ class Dispatcher:
     def _may_begin(self, drone: str) -> bool:
         """Whether a drone has nothing to do, and a battery to do something."""
         course = self.control.drones[drone]
-        if course.failed or course.doubt_m > 0.0 or drone in self._held:
-            return False
-        if drone in self._comes_back and drone in self._charge:
-            self._comes_back.discard(drone)
-            return bool(course.ahead)
-        return not course.ahead and self._charge.get(drone, 0.0) >= self._endurance.starts_at
+        idle = not course.ahead and not course.failed and course.doubt_m <= 0.0
+        idle &= drone not in self._held and drone not in self._comes_back
+        return idle and self._charge.get(drone, 0.0) >= self._endurance.starts_at
 
     def _give_tour(self, drone: str, now_ms: int, most: int) -> bool:
         course, home = self.control.drones[drone], self.docks.home(drone)
