@@ -34,7 +34,6 @@ CONFIG = load_config(CONFIGS / "sim.toml").with_values(
     mission={"autostart": False, "start_countdown_s": 0.0, "dwell_s": 1.0}
 )
 RACKS = load_site(CONFIGS / "site-racks-small.toml")
-V = Version.V3_0
 BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
 
 
@@ -42,10 +41,10 @@ class Master(Manager):
     """It orders."""
 
     async def order(self, way: str, released: int = 99, **more: Any) -> None:
-        await self.say("order", encoded(order(way, released, **more), V))
+        await self.say("order", encoded(order(way, released, **more), self._version))
 
     async def instant(self, kind: str, name: str = "") -> None:
-        await self.say("instantActions", encoded(instant(kind, name), V))
+        await self.say("instantActions", encoded(instant(kind, name), self._version))
 
     @property
     def ahead(self) -> str:
@@ -93,13 +92,14 @@ def managed(
     go: Callable[[Station, Master, Mosquitto], Coroutine[Any, Any, None]],
     written: list[tuple[str, str, str, str]],
     hold_s: float = 60.0,
+    version: Version = Version.V3_0,
 ) -> None:
     """Let the drone `demo` be flown by orders, of a master who does `go`."""
 
     async def whole(broker: Mosquitto) -> None:
         rules = OrderRules(hold_s, lambda *line: written.append(line))
-        fleet = FleetLink(["demo"], read_broker(broker.url), V, BODY, rules)
-        master = Master(V)
+        fleet = FleetLink(["demo"], read_broker(broker.url), version, BODY, rules)
+        master = Master(version)
         demo = ("demo", Address("127.0.0.1", *flight.ports))
         async with master.watching(broker), served(demo, fleet=fleet) as station:
             await go(station, master, broker)
@@ -160,7 +160,7 @@ def test_a_manager_flies_a_drone_until_a_person_stops_it(tmp_path: Path) -> None
 
 
 @pytest.mark.realtime(cores=0.7)
-def test_a_shelf_is_counted_and_without_a_broker_the_drone_holds_and_comes_home(
+def test_by_version_2_1_a_shelf_is_counted_and_without_a_broker_the_drone_holds_and_comes_home(
     tmp_path: Path,
 ) -> None:
     written: list[tuple[str, str, str, str]] = []
@@ -176,4 +176,5 @@ def test_a_shelf_is_counted_and_without_a_broker_the_drone_holds_and_comes_home(
 
     config = CONFIG.with_values(front_camera=FITTED)
     with LiveFlight(RACKS, config, speed=6.0, front=IdealFront(RACKS, SIGHT, Stock())) as flight:
-        managed(tmp_path, flight, lambda _, master, broker: go(flight, master, broker), written, 2.0)
+        two = Version.V2_1
+        managed(tmp_path, flight, lambda _, master, broker: go(flight, master, broker), written, 2.0, two)
