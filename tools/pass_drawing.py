@@ -39,25 +39,14 @@ class Tilt:
         return max(abs(self.turn_rad), abs(self.lean_rad))
 
     def axes(self, right: float, inward: float) -> tuple[Matrix, Matrix]:
-        """The directions to the right and up in the leant plane, (3,) map axes with heights up."""
-        plane = np.array([(right, 0.0, 0.0), (0.0, 0.0, 1.0)])
-        axis = math.cos(self.axis_rad) * plane[0] + math.sin(self.axis_rad) * plane[1]
-        out = np.array((0.0, -inward, 0.0))
-        # each direction's part along the axis stays, the part across it leans out of the face
-        leant = [
-            along * axis
-            + (way - along * axis) * math.cos(self.lean_rad)
-            + across * math.sin(self.lean_rad) * out
-            for way in plane
-            for along, across in [(float(way @ axis), _cross(axis, way, plane))]
-        ]
-        return leant[0], leant[1]
-
-
-def _cross(axis: Matrix, way: Matrix, plane: Matrix) -> float:
-    """The length, with its sign, of the part of `way` across `axis`, both in the plane."""
-    a, w = plane @ axis, plane @ way
-    return float(a[0] * w[1] - a[1] * w[0])
+        """The directions to the right and up in the leant plane, (3,) map axes with heights up; `right` and
+        `inward` as in `Face`."""
+        c, s = math.cos(self.axis_rad), math.sin(self.axis_rad)
+        flat, out = np.array(((right, 0.0, 0.0), (0.0, 0.0, 1.0))), np.array((0.0, -inward, 0.0))
+        axis = c * flat[0] + s * flat[1]
+        # what is across the axis comes out of the face, what is along it stays
+        across = math.cos(self.lean_rad) * (c * flat[1] - s * flat[0]) + math.sin(self.lean_rad) * out
+        return c * axis - s * across, s * axis + c * across
 
 
 @dataclass(frozen=True, slots=True)
