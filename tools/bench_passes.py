@@ -254,7 +254,8 @@ def bare_ms_per_mpx(site: Site, seed: int, frames: int = 15) -> float:
     took = []
     for seq in range(frames):
         x_m = first.x_m + 0.6 * seq
-        true = Kinematics(seq, x_m, first.y_m, 1.4, *[0.0] * 5, math.pi / 2, 0.0, 0.0, 0.0)
+        at_rest = 0.0, 0.0, 0.0
+        true = Kinematics(seq, x_m, first.y_m, 1.4, *at_rest, 0.0, 0.0, math.pi / 2, *at_rest)
         picture = renderer.render(true, seq)
         begun_ns = time.process_time_ns()
         read_codes(picture)

@@ -11,8 +11,9 @@ not read and has bars one way is fitted as a blurred EAN-13 (`blurred_ean`).
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -22,7 +23,7 @@ from flightd.core.geometry import Matrix
 from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf.blurred_ean import read_blurred_ean
 from flightd.vision.shelf.code_modules import module_px, qr_version
-from flightd.vision.shelf.code_regions import CodeRegion, code_regions
+from flightd.vision.shelf.code_regions import CodeRegion, code_regions, edges_turn_rad
 from flightd.vision.shelf.crease_flattening import flatten_qr
 from flightd.vision.shelf.digital_link import parse_digital_link
 from flightd.vision.shelf.gs1 import Gs1Error, parse_element_string
@@ -47,10 +48,12 @@ _CHECKED_RETAIL = frozenset(("EAN-13", "UPC-A"))
 
 @dataclass(frozen=True, slots=True)
 class _Look:
-    """One more way of looking at a region: scaled, turned, altered, negative."""
+    """One more way of looking at a region: scaled, turned, altered, negative.  `upright` turns it back by what
+    its edges are turned by."""
 
     scale: float = 1.0
     turn_deg: float = 0.0
+    upright: bool = False
     alter: Callable[[Image], Image] | None = None
     global_threshold: bool = False
 
@@ -81,7 +84,9 @@ def _without_specks(grey: Image) -> Image:
 
 _LOOKS = (
     _Look(),
+    _Look(upright=True),
     _Look(2.0),
+    _Look(2.0, upright=True),
     _Look(0.5),
     _Look(1.5, alter=_local_contrast),
     _Look(1.0, 30.0),
@@ -106,6 +111,8 @@ _LARGEST_LOOK_PX = 1000
 """Enlarged views longer than this would cost more than they show."""
 _MOST_PIXELS = 5_000_000
 """What the second looks at one picture may scan together: bounds the time on pictures full of texture."""
+_LEAST_TURN_DEG = 4.0
+"""Edges that are turned by less are upright: a level line still crosses all bars of most labels."""
 _SMALLEST_PX = 16
 """Shorter side of a view worth scanning."""
 _MOST_DAMAGED = 2
@@ -203,7 +210,11 @@ def _look_again(grey: Image, region: CodeRegion, found: list[_Candidate], budget
     returns what is left of it."""
     crop = np.ascontiguousarray(grey[region.y0 : region.y1, region.x0 : region.x1])
     damaged: list[tuple[Image, Matrix, zxingcpp.Barcode]] = []
-    for number, look in enumerate(_LOOKS, start=1):
+    turn_deg = math.degrees(edges_turn_rad(crop))
+    for number, one in enumerate(_LOOKS, start=1):
+        if one.upright and abs(turn_deg) < _LEAST_TURN_DEG:
+            continue
+        look = replace(one, turn_deg=turn_deg) if one.upright else one
         if max(crop.shape) * look.scale > _LARGEST_LOOK_PX or min(crop.shape) * look.scale < _SMALLEST_PX:
             continue
         view, picture_from_view = _view(crop, look)

@@ -67,6 +67,17 @@ class CodeRegion:
         return self.x0 <= x < self.x1 and self.y0 <= y < self.y1
 
 
+def edges_turn_rad(grey: Image) -> float:
+    """By how much the two perpendicular directions to which the edges of `grey` (H, W) keep are turned
+    against the picture's, clockwise, at most by 45 degrees either way."""
+    gx, gy = cv2.Scharr(grey, cv2.CV_32F, 1, 0), cv2.Scharr(grey, cv2.CV_32F, 0, 1)
+    along, across = gx * gx - gy * gy, 2.0 * gx * gy
+    energy = gx * gx + gy * gy + 1e-3
+    # (g^2)^2 / |g|^2, as below
+    real, imag = (along * along - across * across) / energy, 2.0 * along * across / energy
+    return math.atan2(float(imag.sum()), float(real.sum())) / 4
+
+
 def code_regions(grey: Image, most: int = 4) -> list[CodeRegion]:
     """At most `most` boxes of `grey` (H, W) that look like codes, margins included, best first."""
     height, width = grey.shape
