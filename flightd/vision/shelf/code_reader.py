@@ -23,9 +23,10 @@ from flightd.core.geometry import Matrix
 from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf.blurred_ean import read_blurred_ean
 from flightd.vision.shelf.code_modules import module_px, qr_version
-from flightd.vision.shelf.code_regions import CodeRegion, code_regions, edges_turn_rad
+from flightd.vision.shelf.code_regions import CodeRegion, code_regions
 from flightd.vision.shelf.crease_flattening import flatten_qr
 from flightd.vision.shelf.digital_link import parse_digital_link
+from flightd.vision.shelf.edge_turn import edges_turn_rad
 from flightd.vision.shelf.gs1 import Gs1Error, parse_element_string
 
 
@@ -48,8 +49,8 @@ _CHECKED_RETAIL = frozenset(("EAN-13", "UPC-A"))
 
 @dataclass(frozen=True, slots=True)
 class _Look:
-    """One more way of looking at a region: scaled, turned, altered, negative.  `upright` turns it back by what
-    its edges are turned by."""
+    """One more way of looking at a region: scaled, turned, altered, negative.  `upright` turns it back by as
+    much as its edges are turned."""
 
     scale: float = 1.0
     turn_deg: float = 0.0
@@ -86,7 +87,7 @@ _LOOKS = (
     _Look(),
     _Look(upright=True),
     _Look(2.0),
-    _Look(2.0, upright=True),
+    _Look(1.5, upright=True),
     _Look(0.5),
     _Look(1.5, alter=_local_contrast),
     _Look(1.0, 30.0),
@@ -111,7 +112,7 @@ _LARGEST_LOOK_PX = 1000
 """Enlarged views longer than this would cost more than they show."""
 _MOST_PIXELS = 5_000_000
 """What the second looks at one picture may scan together: bounds the time on pictures full of texture."""
-_LEAST_TURN_DEG = 4.0
+_LEAST_TURN_RAD = math.radians(4.0)
 """Edges that are turned by less are upright: a level line still crosses all bars of most labels."""
 _SMALLEST_PX = 16
 """Shorter side of a view worth scanning."""
@@ -173,9 +174,10 @@ def read_codes(picture: Image, *, deeper: bool = True) -> tuple[CodeRead, ...]:
     if deeper:
         budget = _MOST_PIXELS
         doubtful = [_around(c, grey.shape[1], grey.shape[0]) for c in found if not c.believed]
-        for region in doubtful + code_regions(grey):
-            if not _is_read(region, found):
-                budget = _look_again(grey, region, found, budget)
+        known = [candidate for candidate in found if candidate.believed]
+        for region in doubtful + code_regions(grey, [candidate.corners for candidate in known]):
+            if not _is_read(region, found, known):
+                budget = _look_again(grey, region, found, known, budget)
     kept = _without_contradictions(found)
     height, width = grey.shape
     reads = [_code_read(candidate, width, height) for candidate in kept]
@@ -201,20 +203,24 @@ def _scan(
     return list(codes)
 
 
-def _is_read(region: CodeRegion, found: Iterable[_Candidate]) -> bool:
-    return any(candidate.believed and candidate.inside(region) for candidate in found)
+def _is_read(region: CodeRegion, found: Iterable[_Candidate], known: Sequence[_Candidate]) -> bool:
+    """Whether something inside is believed that was not `known` before."""
+    new = (one for one in found if not any(one is other for other in known))
+    return any(candidate.believed and candidate.inside(region) for candidate in new)
 
 
-def _look_again(grey: Image, region: CodeRegion, found: list[_Candidate], budget: int) -> int:
-    """Try every look on a region until something inside is believed, or the budget of pixels is spent;
-    returns what is left of it."""
+def _look_again(
+    grey: Image, region: CodeRegion, found: list[_Candidate], known: Sequence[_Candidate], budget: int
+) -> int:
+    """Try every look on a region until something inside is believed that is not `known`, or the budget of
+    pixels is spent; returns what is left of it."""
     crop = np.ascontiguousarray(grey[region.y0 : region.y1, region.x0 : region.x1])
     damaged: list[tuple[Image, Matrix, zxingcpp.Barcode]] = []
-    turn_deg = math.degrees(edges_turn_rad(crop))
+    turn_rad = edges_turn_rad(crop, _LEAST_TURN_RAD)
     for number, one in enumerate(_LOOKS, start=1):
-        if one.upright and abs(turn_deg) < _LEAST_TURN_DEG:
+        if one.upright and turn_rad is None:
             continue
-        look = replace(one, turn_deg=turn_deg) if one.upright else one
+        look = replace(one, turn_deg=math.degrees(turn_rad or 0.0)) if one.upright else one
         if max(crop.shape) * look.scale > _LARGEST_LOOK_PX or min(crop.shape) * look.scale < _SMALLEST_PX:
             continue
         view, picture_from_view = _view(crop, look)
@@ -229,7 +235,7 @@ def _look_again(grey: Image, region: CodeRegion, found: list[_Candidate], budget
         codes = _scan(view, chosen, return_errors=True)
         _collect(found, codes, picture_from_view, number)
         damaged += [(view, picture_from_view, code) for code in codes if _is_damaged_qr(code)][:1]
-        if _is_read(region, found):
+        if _is_read(region, found, known):
             return budget
     if not _flatten_damaged(damaged, found):
         _read_blurred(crop, region, found)

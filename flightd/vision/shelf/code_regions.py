@@ -8,6 +8,7 @@ symmetry, |mean(g^4 / |g|^2)| / mean(|g|^2) for the gradient g as a complex numb
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -15,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flightd.core.geometry import Matrix
 from flightd.core.types import Image
 
 _Floats: TypeAlias = NDArray[np.float32]
@@ -63,29 +65,25 @@ class CodeRegion:
             self.evidence + other.evidence,
         )
 
+    def widened(self, margin: float) -> CodeRegion:
+        """With so much more room on all sides."""
+        x0, y0, x1, y1 = self.x0 - margin, self.y0 - margin, self.x1 + margin, self.y1 + margin
+        return CodeRegion(int(x0), int(y0), int(x1) + 1, int(y1) + 1, self.evidence)
+
     def contains(self, x: float, y: float) -> bool:
         return self.x0 <= x < self.x1 and self.y0 <= y < self.y1
 
 
-def edges_turn_rad(grey: Image) -> float:
-    """By how much the two perpendicular directions to which the edges of `grey` (H, W) keep are turned
-    against the picture's, clockwise, at most by 45 degrees either way."""
-    gx, gy = cv2.Scharr(grey, cv2.CV_32F, 1, 0), cv2.Scharr(grey, cv2.CV_32F, 0, 1)
-    along, across = gx * gx - gy * gy, 2.0 * gx * gy
-    energy = gx * gx + gy * gy + 1e-3
-    # (g^2)^2 / |g|^2, as below
-    real, imag = (along * along - across * across) / energy, 2.0 * along * across / energy
-    return math.atan2(float(imag.sum()), float(real.sum())) / 4
-
-
-def code_regions(grey: Image, most: int = 4) -> list[CodeRegion]:
-    """At most `most` boxes of `grey` (H, W) that look like codes, margins included, best first."""
+def code_regions(grey: Image, known: Sequence[Matrix] = (), most: int = 4) -> list[CodeRegion]:
+    """At most `most` boxes of `grey` (H, W) that look like codes, margins included, best first; without what
+    the `known` codes, (4, 2) corners each, explain."""
     height, width = grey.shape
     half = np.asarray(
         cv2.resize(grey, (width // 2 + 1, height // 2 + 1), interpolation=cv2.INTER_AREA), np.uint8
     )
     # fine modules are dense edges at full size only, large ones at half size only
-    pieces = _pieces(grey, 1, _MIN_DENSITY) + _pieces(half, 2, _MIN_DENSITY_HALF)
+    boxes = [CodeRegion(*_box(corners), 0.0) for corners in known]
+    pieces = _pieces(grey, 1, _MIN_DENSITY, boxes) + _pieces(half, 2, _MIN_DENSITY_HALF, boxes)
     whole = [region for region in _merged(pieces) if region.evidence >= _MIN_EVIDENCE_PX]
     clipped = [
         CodeRegion(max(0, r.x0), max(0, r.y0), min(width, r.x1), min(height, r.y1), r.evidence) for r in whole
@@ -93,8 +91,14 @@ def code_regions(grey: Image, most: int = 4) -> list[CodeRegion]:
     return sorted(clipped, key=lambda region: -region.evidence)[:most]
 
 
-def _pieces(grey: Image, shrunk: int, least_density: float) -> list[CodeRegion]:
-    """Connected evidence, in pixels of the picture `shrunk` times as large."""
+def _box(corners: Matrix) -> tuple[int, int, int, int]:
+    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+    return int(x0), int(y0), int(x1) + 1, int(y1) + 1
+
+
+def _pieces(grey: Image, shrunk: int, least_density: float, known: Sequence[CodeRegion]) -> list[CodeRegion]:
+    """Connected evidence that none of the `known` boxes touches, in pixels of the picture `shrunk` times as
+    large."""
     step = math.ceil(max(grey.shape) / _SAMPLES)
     if min(grey.shape) < 3 * step:
         return []
@@ -107,11 +111,9 @@ def _pieces(grey: Image, shrunk: int, least_density: float) -> list[CodeRegion]:
         evidence = float(strength[y : y + h, x : x + w].sum()) * pixel * pixel
         if min(w, h) < _MIN_SIDE or evidence < _MIN_PIECE_PX:
             continue
-        margin = _MARGIN * max(w, h) + _WINDOW / 2
-        x0, y0, x1, y1 = x - margin, y - margin, x + w + margin, y + h + margin
-        found.append(
-            CodeRegion(int(x0 * pixel), int(y0 * pixel), int(x1 * pixel) + 1, int(y1 * pixel) + 1, evidence)
-        )
+        piece = CodeRegion(x * pixel, y * pixel, (x + w) * pixel, (y + h) * pixel, evidence)
+        if not any(piece.touches(box) for box in known):
+            found.append(piece.widened((_MARGIN * max(w, h) + _WINDOW / 2) * pixel))
     return found
 
 
