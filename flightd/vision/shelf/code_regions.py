@@ -40,6 +40,8 @@ _MIN_PIECE_PX = 500.0
 _MIN_EVIDENCE_PX = 1800.0
 """A code of 25 modules read at 2.5 pixels for each covers as much; the corner of a box less."""
 _MARGIN = 0.25
+_AROUND = 0.7
+"""Part of a code's length within which more of the kind belongs to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +84,7 @@ def code_regions(grey: Image, known: Sequence[Matrix] = (), most: int = 4) -> li
         cv2.resize(grey, (width // 2 + 1, height // 2 + 1), interpolation=cv2.INTER_AREA), np.uint8
     )
     # fine modules are dense edges at full size only, large ones at half size only
-    boxes = [CodeRegion(*_box(corners), 0.0) for corners in known]
+    boxes = [_surroundings(corners) for corners in known]
     pieces = _pieces(grey, 1, _MIN_DENSITY, boxes) + _pieces(half, 2, _MIN_DENSITY_HALF, boxes)
     whole = [region for region in _merged(pieces) if region.evidence >= _MIN_EVIDENCE_PX]
     clipped = [
@@ -91,9 +93,12 @@ def code_regions(grey: Image, known: Sequence[Matrix] = (), most: int = 4) -> li
     return sorted(clipped, key=lambda region: -region.evidence)[:most]
 
 
-def _box(corners: Matrix) -> tuple[int, int, int, int]:
+def _surroundings(corners: Matrix) -> CodeRegion:
+    """The box of a code with what belongs to it: its printed text, its frame, an add-on."""
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
-    return int(x0), int(y0), int(x1) + 1, int(y1) + 1
+    return CodeRegion(int(x0), int(y0), int(x1) + 1, int(y1) + 1, 0.0).widened(
+        _AROUND * max(x1 - x0, y1 - y0)
+    )
 
 
 def _pieces(grey: Image, shrunk: int, least_density: float, known: Sequence[CodeRegion]) -> list[CodeRegion]:
