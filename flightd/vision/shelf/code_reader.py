@@ -1,11 +1,12 @@
 """Codes in a picture: every symbology zxing-cpp knows, looked for again where something looks like a code.
 
-The first look is at the whole picture as it is.  Only where dense perpendicular edges say that a code may
-be (`code_regions`) and none was read, the region is looked at again: inverted, enlarged, shrunk, with local
-contrast, sharpened, smoothed, turned.  A read is believed when error correction or a checksum vouches for
-it; a checksum of one digit found in an altered picture, and symbologies without any, need a second look
-that agrees.  Two believed texts at one place contradict each other, and then neither counts.  What is still
-not read and has bars one way is fitted as a blurred EAN-13 (`blurred_ean`).
+The first look is at the picture as it is, wherever it has edges enough for a code.  Only where dense
+perpendicular edges say that one may be (`code_regions`) and none was read, the region is looked at again:
+turned upright, inverted, enlarged, shrunk, with local contrast, sharpened, smoothed.  A read is believed when
+error correction or a checksum vouches for it; a checksum of one digit found in an altered picture, and
+symbologies without any, need a second look that agrees.  Two believed texts at one place contradict each
+other, and then neither counts.  What is still not read and has bars one way is fitted as a blurred EAN-13
+(`blurred_ean`).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from flightd.core.geometry import Matrix
 from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf.blurred_ean import read_blurred_ean
 from flightd.vision.shelf.code_modules import module_px, qr_version
-from flightd.vision.shelf.code_regions import CodeRegion, code_regions
+from flightd.vision.shelf.code_regions import CodeRegion, CodeSearch
 from flightd.vision.shelf.crease_flattening import flatten_qr
 from flightd.vision.shelf.digital_link import parse_digital_link
 from flightd.vision.shelf.edge_turn import edges_turn_rad
@@ -170,12 +171,15 @@ def read_codes(picture: Image, *, deeper: bool = True) -> tuple[CodeRead, ...]:
     """
     grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture, np.uint8)
     found: list[_Candidate] = []
-    _collect(found, _scan(grey, try_invert=False), np.eye(3), 0)
+    search = CodeSearch(grey)
+    for busy in search.busy():
+        codes = _scan(_part(grey, busy), try_invert=False)
+        _collect(found, codes, _picture_from_part(busy), 0)
     if deeper:
         budget = _MOST_PIXELS
         doubtful = [_around(c, grey.shape[1], grey.shape[0]) for c in found if not c.believed]
         known = [candidate for candidate in found if candidate.believed]
-        for region in doubtful + code_regions(grey, [candidate.corners for candidate in known]):
+        for region in doubtful + search.regions([candidate.corners for candidate in known]):
             if not _is_read(region, found, known):
                 budget = _look_again(grey, region, found, known, budget)
     kept = _without_contradictions(found)
@@ -203,6 +207,15 @@ def _scan(
     return list(codes)
 
 
+def _part(grey: Image, region: CodeRegion) -> Image:
+    return np.ascontiguousarray(grey[region.y0 : region.y1, region.x0 : region.x1])
+
+
+def _picture_from_part(region: CodeRegion) -> Matrix:
+    """The (3, 3) map from the pixels of a part to the picture's."""
+    return np.array([[1.0, 0, region.x0], [0, 1.0, region.y0], [0, 0, 1.0]])
+
+
 def _is_read(region: CodeRegion, found: Iterable[_Candidate], known: Sequence[_Candidate]) -> bool:
     """Whether something inside is believed that was not `known` before."""
     new = (one for one in found if not any(one is other for other in known))
@@ -214,7 +227,7 @@ def _look_again(
 ) -> int:
     """Try every look on a region until something inside is believed that is not `known`, or the budget of
     pixels is spent; returns what is left of it."""
-    crop = np.ascontiguousarray(grey[region.y0 : region.y1, region.x0 : region.x1])
+    crop = _part(grey, region)
     damaged: list[tuple[Image, Matrix, zxingcpp.Barcode]] = []
     turn_rad = edges_turn_rad(crop, _LEAST_TURN_RAD)
     for number, one in enumerate(_LOOKS, start=1):
@@ -227,9 +240,7 @@ def _look_again(
         budget -= view.size
         if budget < 0:
             break
-        picture_from_view = (
-            np.array([[1.0, 0, region.x0], [0, 1.0, region.y0], [0, 0, 1.0]]) @ picture_from_view
-        )
+        picture_from_view = _picture_from_part(region) @ picture_from_view
         binarizer = zxingcpp.Binarizer
         chosen = binarizer.GlobalHistogram if look.global_threshold else binarizer.LocalAverage
         codes = _scan(view, chosen, return_errors=True)

@@ -8,7 +8,7 @@ symmetry, |mean(g^4 / |g|^2)| / mean(|g|^2) for the gradient g as a complex numb
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -35,11 +35,16 @@ _MIN_DENSITY_HALF = 0.60
 _MIN_SYMMETRY = 0.42
 _GAP = 9
 """Samples without evidence that a code may have inside: a blot, a reflection."""
-_MIN_SIDE = 8
+_MIN_SIDE, _MIN_BUSY_SIDE = 8, 5
 _MIN_PIECE_PX = 500.0
 _MIN_EVIDENCE_PX = 1800.0
 """A code of 25 modules read at 2.5 pixels for each covers as much; the corner of a box less."""
 _MARGIN = 0.25
+_BUSY_PART = 0.8
+"""Part of the density of a code from which something may be one, or a part of one."""
+_MOST_BUSY = 0.6
+"""Part of the picture that busy boxes may cover together, so that looking at them alone is worth it."""
+_SMALL_PICTURE_PX = 400_000
 _AROUND = 0.7
 """Part of a code's length within which more of the kind belongs to it."""
 
@@ -67,59 +72,101 @@ class CodeRegion:
             self.evidence + other.evidence,
         )
 
-    def widened(self, margin: float) -> CodeRegion:
-        """With so much more room on all sides."""
-        x0, y0, x1, y1 = self.x0 - margin, self.y0 - margin, self.x1 + margin, self.y1 + margin
+    def widened(self, aside: float, above: float) -> CodeRegion:
+        """With so much more room to the left and right, above and below."""
+        x0, y0, x1, y1 = self.x0 - aside, self.y0 - above, self.x1 + aside, self.y1 + above
         return CodeRegion(int(x0), int(y0), int(x1) + 1, int(y1) + 1, self.evidence)
 
     def contains(self, x: float, y: float) -> bool:
         return self.x0 <= x < self.x1 and self.y0 <= y < self.y1
 
 
-def code_regions(grey: Image, known: Sequence[Matrix] = (), most: int = 4) -> list[CodeRegion]:
-    """At most `most` boxes of `grey` (H, W) that look like codes, margins included, best first; without what
-    the `known` codes, (4, 2) corners each, explain."""
-    height, width = grey.shape
-    half = np.asarray(
-        cv2.resize(grey, (width // 2 + 1, height // 2 + 1), interpolation=cv2.INTER_AREA), np.uint8
-    )
-    # fine modules are dense edges at full size only, large ones at half size only
-    boxes = [_surroundings(corners) for corners in known]
-    pieces = _pieces(grey, 1, _MIN_DENSITY, boxes) + _pieces(half, 2, _MIN_DENSITY_HALF, boxes)
-    whole = [region for region in _merged(pieces) if region.evidence >= _MIN_EVIDENCE_PX]
-    clipped = [
-        CodeRegion(max(0, r.x0), max(0, r.y0), min(width, r.x1), min(height, r.y1), r.evidence) for r in whole
-    ]
-    return sorted(clipped, key=lambda region: -region.evidence)[:most]
+@dataclass(frozen=True, slots=True)
+class _Layer:
+    """Density and symmetry of the edges about every `pixel`-th pixel, and the density that a code has."""
+
+    density: _Floats
+    symmetry: _Floats
+    pixel: int
+    least_density: float
+
+    def box(self, x: int, y: int, w: int, h: int, evidence: float) -> CodeRegion:
+        """Samples as pixels of the picture."""
+        return CodeRegion(*(side * self.pixel for side in (x, y, x + w, y + h)), evidence)
+
+    def margin(self, long: int) -> float:
+        """Pixels in which a code so many samples long may go on, or have its quiet zone."""
+        return (_MARGIN * long + _WINDOW / 2) * self.pixel
+
+
+class CodeSearch:
+    """Where codes may be in a picture, `grey` (H, W)."""
+
+    def __init__(self, grey: Image) -> None:
+        height, width = self._shape = grey.shape
+        even = grey[: height // 2 * 2, : width // 2 * 2]
+        half = cv2.resize(even, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+        # fine modules are dense edges at full size only, large ones at half size only
+        layers = _layer(grey, 1, _MIN_DENSITY), _layer(np.asarray(half, np.uint8), 2, _MIN_DENSITY_HALF)
+        self._layers = [layer for layer in layers if layer is not None]
+
+    def busy(self) -> list[CodeRegion]:
+        """Boxes with all codes and much that is none: edges of any direction, with room for quiet zones; one
+        box with the whole picture where that is small, or hardly larger than these."""
+        height, width = self._shape
+        whole = CodeRegion(0, 0, width, height, 0.0)
+        if height * width <= _SMALL_PICTURE_PX:
+            return [whole]
+        pieces = []
+        for layer in self._layers:
+            for x, y, w, h in _boxes(layer.density > _BUSY_PART * layer.least_density):
+                if min(w, h) >= _MIN_BUSY_SIDE:
+                    pieces.append(layer.box(x, y, w, h, 0.0).widened(layer.margin(w), layer.margin(h)))
+        found = [self._clipped(region) for region in _merged(pieces)]
+        area = sum((region.x1 - region.x0) * (region.y1 - region.y0) for region in found)
+        return found if area < _MOST_BUSY * height * width else [whole]
+
+    def regions(self, known: Sequence[Matrix] = (), most: int = 4) -> list[CodeRegion]:
+        """At most `most` boxes that look like codes, margins included, best first; without what the `known`
+        codes, (4, 2) corners each, explain."""
+        boxes = [_surroundings(corners) for corners in known]
+        pieces = [piece for layer in self._layers for piece in _pieces(layer, boxes)]
+        found = [self._clipped(one) for one in _merged(pieces) if one.evidence >= _MIN_EVIDENCE_PX]
+        return sorted(found, key=lambda region: -region.evidence)[:most]
+
+    def _clipped(self, r: CodeRegion) -> CodeRegion:
+        height, width = self._shape
+        return CodeRegion(max(0, r.x0), max(0, r.y0), min(width, r.x1), min(height, r.y1), r.evidence)
 
 
 def _surroundings(corners: Matrix) -> CodeRegion:
     """The box of a code with what belongs to it: its printed text, its frame, an add-on."""
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
-    return CodeRegion(int(x0), int(y0), int(x1) + 1, int(y1) + 1, 0.0).widened(
-        _AROUND * max(x1 - x0, y1 - y0)
-    )
+    around = _AROUND * max(x1 - x0, y1 - y0)
+    return CodeRegion(int(x0), int(y0), int(x1) + 1, int(y1) + 1, 0.0).widened(around, around)
 
 
-def _pieces(grey: Image, shrunk: int, least_density: float, known: Sequence[CodeRegion]) -> list[CodeRegion]:
-    """Connected evidence that none of the `known` boxes touches, in pixels of the picture `shrunk` times as
-    large."""
-    step = math.ceil(max(grey.shape) / _SAMPLES)
-    if min(grey.shape) < 3 * step:
-        return []
-    strength = _strength(grey, step, least_density)
-    mask = cv2.morphologyEx((strength > 0).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((_GAP, _GAP), np.uint8))
-    _, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    pixel = step * shrunk
-    found = []
-    for x, y, w, h, _ in stats[1:].tolist():
-        evidence = float(strength[y : y + h, x : x + w].sum()) * pixel * pixel
+def _boxes(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
+    """(x, y, width, height) of what hangs together, small gaps closed."""
+    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((_GAP, _GAP), np.uint8))
+    outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    for outline in outlines:
+        x, y, w, h = cv2.boundingRect(outline)
+        yield x, y, w, h
+
+
+def _pieces(layer: _Layer, known: Sequence[CodeRegion]) -> Iterator[CodeRegion]:
+    """Connected evidence that none of the `known` boxes touches."""
+    good = (layer.density > layer.least_density) & (layer.symmetry > _MIN_SYMMETRY)
+    strength = np.where(good, layer.density, 0.0)
+    for x, y, w, h in _boxes(good):
+        evidence = float(strength[y : y + h, x : x + w].sum()) * layer.pixel**2
         if min(w, h) < _MIN_SIDE or evidence < _MIN_PIECE_PX:
             continue
-        piece = CodeRegion(x * pixel, y * pixel, (x + w) * pixel, (y + h) * pixel, evidence)
+        piece = layer.box(x, y, w, h, evidence)
         if not any(piece.touches(box) for box in known):
-            found.append(piece.widened((_MARGIN * max(w, h) + _WINDOW / 2) * pixel))
-    return found
+            margin = layer.margin(max(w, h))
+            yield piece.widened(margin, margin)
 
 
 def _merged(regions: list[CodeRegion]) -> list[CodeRegion]:
@@ -135,8 +182,11 @@ def _merged(regions: list[CodeRegion]) -> list[CodeRegion]:
     return merged
 
 
-def _strength(grey: Image, step: int, least_density: float) -> _Floats:
-    """Edge density at every `step`-th pixel where it and the symmetry say that this may be a code, else 0."""
+def _layer(grey: Image, shrunk: int, least_density: float) -> _Layer | None:
+    """The edges of a picture that is `shrunk`; None where it is too small to have any."""
+    step = math.ceil(max(grey.shape) / _SAMPLES)
+    if min(grey.shape) < 3 * step:
+        return None
     rows, columns = slice(1, -1, step), slice(1, -1, step)
     # differences over the pixel's own neighbours: fine modules survive, which no shrunk picture would keep
     gx = cv2.subtract(grey[rows, 2::step], grey[rows, :-2:step], dtype=cv2.CV_32F)
@@ -152,5 +202,4 @@ def _strength(grey: Image, step: int, least_density: float) -> _Floats:
     levels = cv2.subtract(cv2.dilate(middles, window), cv2.erode(middles, window)).astype(np.float32)
     edge = energy > np.square(np.maximum(_MIN_STEP, _MIN_RELATIVE_STEP * levels))
     density = cv2.blur(edge.astype(np.float32), box)
-    good = (density > least_density) & (symmetry > _MIN_SYMMETRY)
-    return np.where(good, density, 0.0).astype(np.float32)
+    return _Layer(np.asarray(density, np.float32), symmetry, step * shrunk, least_density)

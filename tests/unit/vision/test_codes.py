@@ -13,7 +13,7 @@ import zxingcpp
 
 from flightd.core.types import Image
 from flightd.vision.shelf.code_reader import read_codes
-from flightd.vision.shelf.code_regions import code_regions
+from flightd.vision.shelf.code_regions import CodeSearch
 
 PHOTOGRAPHS = Path(__file__).parents[4] / "shared" / "real" / "codes"
 LINES = PHOTOGRAPHS.parent / "lines"
@@ -169,11 +169,11 @@ def test_blur_may_hide_a_code_but_never_changes_it(kind: str, sigma_px: float) -
 def test_the_region_of_a_code_is_found_and_a_bare_shelf_has_none() -> None:
     picture = on_shelf(qr("where", 4), 400, 250)
     grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8)
-    (region,) = code_regions(grey)
+    (region,) = CodeSearch(grey).regions()
     assert region.contains(400 + 66, 250 + 66)
     assert (region.x1 - region.x0) * (region.y1 - region.y0) < 0.2 * grey.size
     bare = on_shelf(np.full((10, 10), 128, np.uint8), 0, 0)
-    assert code_regions(np.asarray(cv2.cvtColor(bare, cv2.COLOR_BGR2GRAY), np.uint8)) == []
+    assert CodeSearch(np.asarray(cv2.cvtColor(bare, cv2.COLOR_BGR2GRAY), np.uint8)).regions() == []
 
 
 @pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="the photographs are not beside this repository")
