@@ -115,6 +115,7 @@ _MOST_PIXELS = 5_000_000
 """What the second looks at one picture may scan together: bounds the time on pictures full of texture."""
 _LEAST_TURN_RAD = math.radians(4.0)
 """Edges that are turned by less are upright: a level line still crosses all bars of most labels."""
+_SHRUNK = 4
 _SMALLEST_PX = 16
 """Shorter side of a view worth scanning."""
 _MOST_DAMAGED = 2
@@ -172,9 +173,10 @@ def read_codes(picture: Image, *, deeper: bool = True) -> tuple[CodeRead, ...]:
     grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture, np.uint8)
     found: list[_Candidate] = []
     search = CodeSearch(grey)
-    for busy in search.busy():
-        codes = _scan(_part(grey, busy), try_invert=False)
-        _collect(found, codes, _picture_from_part(busy), 0)
+    busy = search.busy()
+    for view, picture_from_view in _first_views(grey, busy):
+        codes = _scan(view, try_invert=False, try_downscale=busy is None)
+        _collect(found, codes, picture_from_view, 0)
     if deeper:
         budget = _MOST_PIXELS
         doubtful = [_around(c, grey.shape[1], grey.shape[0]) for c in found if not c.believed]
@@ -188,11 +190,27 @@ def read_codes(picture: Image, *, deeper: bool = True) -> tuple[CodeRead, ...]:
     return tuple(sorted(reads, key=lambda read: (not read.believed, min(y for _, y in read.corners_px))))
 
 
+def _first_views(grey: Image, busy: Sequence[CodeRegion] | None) -> Iterator[tuple[Image, Matrix]]:
+    """What the first look is at: the whole, or its busy boxes, and all of it shrunk for what is large there;
+    with the (3, 3) map from each view's pixels to the picture's."""
+    if busy is None:
+        yield grey, np.eye(3)
+        return
+    for box in busy:
+        yield _part(grey, box), _picture_from_part(box)
+    height, width = (side // _SHRUNK for side in grey.shape)
+    even = grey[: height * _SHRUNK, : width * _SHRUNK]
+    middle = (_SHRUNK - 1) / 2
+    small = cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA)
+    yield np.asarray(small, np.uint8), np.array([[_SHRUNK, 0, middle], [0, _SHRUNK, middle], [0, 0, 1.0]])
+
+
 def _scan(
     grey: Image,
     binarizer: zxingcpp.Binarizer = zxingcpp.Binarizer.LocalAverage,
     *,
     try_invert: bool = True,
+    try_downscale: bool = True,
     return_errors: bool = False,
 ) -> list[zxingcpp.Barcode]:
     if min(grey.shape) < _SMALLEST_PX:
@@ -202,6 +220,7 @@ def _scan(
         text_mode=zxingcpp.TextMode.Plain,
         binarizer=binarizer,
         try_invert=try_invert,
+        try_downscale=try_downscale,
         return_errors=return_errors,
     )
     return list(codes)

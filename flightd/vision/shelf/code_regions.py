@@ -40,8 +40,9 @@ _MIN_PIECE_PX = 500.0
 _MIN_EVIDENCE_PX = 1800.0
 """A code of 25 modules read at 2.5 pixels for each covers as much; the corner of a box less."""
 _MARGIN = 0.25
-_BUSY_PART = 0.8
-"""Part of the density of a code from which something may be one, or a part of one."""
+_QUIET = 0.15
+_BUSY_DENSITY = 0.22
+"""More than the edge of a box has; in codes of fine modules it is 0.27 and more."""
 _MOST_BUSY = 0.6
 """Part of the picture that busy boxes may cover together, so that looking at them alone is worth it."""
 _SMALL_PICTURE_PX = 400_000
@@ -83,20 +84,35 @@ class CodeRegion:
 
 @dataclass(frozen=True, slots=True)
 class _Layer:
-    """Density and symmetry of the edges about every `pixel`-th pixel, and the density that a code has."""
+    """Edges at every `pixel`-th pixel: their density about it, the squares and the product of the gradient's
+    parts (right, down), and the density that a code has."""
 
     density: _Floats
-    symmetry: _Floats
+    squares: tuple[_Floats, _Floats, _Floats]
     pixel: int
     least_density: float
+
+    def symmetry(self) -> _Floats:
+        """The four-fold symmetry, 0..1."""
+        xx, yy, xy = self.squares
+        energy, box = xx + yy, (_WINDOW, _WINDOW)
+        # g^4 / |g|^2 = (g^2)^2 / |g|^2 with g^2 = (xx - yy) + 2i xy, and |g^2| = |g|^2
+        four_real = cv2.blur(energy - 8.0 * xy * xy / (energy + 1e-3), box)
+        four_imag = cv2.blur(4.0 * (xx - yy) * xy / (energy + 1e-3), box)
+        found: _Floats = cv2.magnitude(four_real, four_imag) / (cv2.blur(energy, box) + 1e-3)
+        return found
 
     def box(self, x: int, y: int, w: int, h: int, evidence: float) -> CodeRegion:
         """Samples as pixels of the picture."""
         return CodeRegion(*(side * self.pixel for side in (x, y, x + w, y + h)), evidence)
 
     def margin(self, long: int) -> float:
-        """Pixels in which a code so many samples long may go on, or have its quiet zone."""
+        """Pixels in which a code that shows over so many samples may go on."""
         return (_MARGIN * long + _WINDOW / 2) * self.pixel
+
+    def quiet(self, long: int) -> float:
+        """Pixels beside a code so many samples long that its quiet zone may take."""
+        return (_QUIET * long + _WINDOW / 4) * self.pixel
 
 
 class CodeSearch:
@@ -110,21 +126,19 @@ class CodeSearch:
         layers = _layer(grey, 1, _MIN_DENSITY), _layer(np.asarray(half, np.uint8), 2, _MIN_DENSITY_HALF)
         self._layers = [layer for layer in layers if layer is not None]
 
-    def busy(self) -> list[CodeRegion]:
-        """Boxes with all codes and much that is none: edges of any direction, with room for quiet zones; one
-        box with the whole picture where that is small, or hardly larger than these."""
+    def busy(self) -> list[CodeRegion] | None:
+        """Boxes with all codes of modules up to 6 pixels, and much that is none: edges of any direction, with
+        room for quiet zones.  None where the picture is small, or hardly larger than these."""
         height, width = self._shape
-        whole = CodeRegion(0, 0, width, height, 0.0)
-        if height * width <= _SMALL_PICTURE_PX:
-            return [whole]
-        pieces = []
-        for layer in self._layers:
-            for x, y, w, h in _boxes(layer.density > _BUSY_PART * layer.least_density):
-                if min(w, h) >= _MIN_BUSY_SIDE:
-                    pieces.append(layer.box(x, y, w, h, 0.0).widened(layer.margin(w), layer.margin(h)))
+        if height * width <= _SMALL_PICTURE_PX or not self._layers:
+            return None
+        fine, pieces = self._layers[0], []
+        for x, y, w, h in _boxes(fine.density > _BUSY_DENSITY):
+            if min(w, h) >= _MIN_BUSY_SIDE:
+                pieces.append(fine.box(x, y, w, h, 0.0).widened(fine.quiet(w), fine.quiet(h)))
         found = [self._clipped(region) for region in _merged(pieces)]
         area = sum((region.x1 - region.x0) * (region.y1 - region.y0) for region in found)
-        return found if area < _MOST_BUSY * height * width else [whole]
+        return found if area < _MOST_BUSY * height * width else None
 
     def regions(self, known: Sequence[Matrix] = (), most: int = 4) -> list[CodeRegion]:
         """At most `most` boxes that look like codes, margins included, best first; without what the `known`
@@ -157,7 +171,10 @@ def _boxes(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
 
 def _pieces(layer: _Layer, known: Sequence[CodeRegion]) -> Iterator[CodeRegion]:
     """Connected evidence that none of the `known` boxes touches."""
-    good = (layer.density > layer.least_density) & (layer.symmetry > _MIN_SYMMETRY)
+    dense = layer.density > layer.least_density
+    if not dense.any():
+        return
+    good = dense & (layer.symmetry() > _MIN_SYMMETRY)
     strength = np.where(good, layer.density, 0.0)
     for x, y, w, h in _boxes(good):
         evidence = float(strength[y : y + h, x : x + w].sum()) * layer.pixel**2
@@ -192,14 +209,8 @@ def _layer(grey: Image, shrunk: int, least_density: float) -> _Layer | None:
     gx = cv2.subtract(grey[rows, 2::step], grey[rows, :-2:step], dtype=cv2.CV_32F)
     gy = cv2.subtract(grey[2::step, columns], grey[:-2:step, columns], dtype=cv2.CV_32F)
     xx, yy, xy = gx * gx, gy * gy, gx * gy
-    energy = xx + yy
-    # g^4 / |g|^2 = (g^2)^2 / |g|^2 with g^2 = (xx - yy) + 2i xy, and |g^2| = |g|^2
-    box = (_WINDOW, _WINDOW)
-    four_real = cv2.blur(energy - 8.0 * xy * xy / (energy + 1e-3), box)
-    four_imag = cv2.blur(4.0 * (xx - yy) * xy / (energy + 1e-3), box)
-    symmetry = cv2.magnitude(four_real, four_imag) / (cv2.blur(energy, box) + 1e-3)
-    middles, window = grey[rows, columns], np.ones(box, np.uint8)
+    middles, window = grey[rows, columns], np.ones((_WINDOW, _WINDOW), np.uint8)
     levels = cv2.subtract(cv2.dilate(middles, window), cv2.erode(middles, window)).astype(np.float32)
-    edge = energy > np.square(np.maximum(_MIN_STEP, _MIN_RELATIVE_STEP * levels))
-    density = cv2.blur(edge.astype(np.float32), box)
-    return _Layer(np.asarray(density, np.float32), symmetry, step * shrunk, least_density)
+    edge = xx + yy > np.square(np.maximum(_MIN_STEP, _MIN_RELATIVE_STEP * levels))
+    density = np.asarray(cv2.blur(edge.astype(np.float32), (_WINDOW, _WINDOW)), np.float32)
+    return _Layer(density, (xx, yy, xy), step * shrunk, least_density)

@@ -27,12 +27,12 @@ def edges_turn_rad(grey: Image, least_rad: float) -> float | None:
     weight = np.minimum(size[edges], np.percentile(size[edges], 50))
     turn = (np.arctan2(gy[edges], gx[edges]) + np.pi / 4) % (np.pi / 2) - np.pi / 4
     often, _ = np.histogram(turn, _BINS, (-np.pi / 4, np.pi / 4), weights=weight)
-    often = np.convolve(np.concatenate([often[-1:], often, often[:1]]), [0.5, 1.0, 0.5], "valid")
     middles = (np.arange(_BINS) + 0.5) * np.pi / 2 / _BINS - np.pi / 4
     often[np.abs(middles) < least_rad] = 0.0
+    often = np.convolve(np.concatenate([often[-1:], often, often[:1]]), [0.5, 1.0, 0.5], "valid")
     best = int(often.argmax())
     if often[best] < _LEAST_SHARE * weight.sum():
         return None
     off = (turn - middles[best] + np.pi / 4) % (np.pi / 2) - np.pi / 4
-    near = np.abs(off) < _NEAR_RAD
+    near = (np.abs(off) < _NEAR_RAD) & (np.abs(turn) >= least_rad)
     return float(middles[best] + (weight[near] * off[near]).sum() / weight[near].sum())
