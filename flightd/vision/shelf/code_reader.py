@@ -24,7 +24,7 @@ from flightd.core.geometry import Matrix
 from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf.blurred_ean import read_blurred_ean
 from flightd.vision.shelf.code_modules import module_px, qr_version
-from flightd.vision.shelf.code_regions import CodeRegion, CodeSearch
+from flightd.vision.shelf.code_regions import CodeRegion, CodeSearch, shrunk
 from flightd.vision.shelf.crease_flattening import flatten_qr
 from flightd.vision.shelf.digital_link import parse_digital_link
 from flightd.vision.shelf.edge_turn import edges_turn_rad
@@ -198,11 +198,8 @@ def _first_views(grey: Image, busy: Sequence[CodeRegion] | None) -> Iterator[tup
         return
     for box in busy:
         yield _part(grey, box), _picture_from_part(box)
-    height, width = (side // _SHRUNK for side in grey.shape)
-    even = grey[: height * _SHRUNK, : width * _SHRUNK]
     middle = (_SHRUNK - 1) / 2
-    small = cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA)
-    yield np.asarray(small, np.uint8), np.array([[_SHRUNK, 0, middle], [0, _SHRUNK, middle], [0, 0, 1.0]])
+    yield shrunk(grey, _SHRUNK), np.array([[_SHRUNK, 0, middle], [0, _SHRUNK, middle], [0, 0, 1.0]])
 
 
 def _scan(

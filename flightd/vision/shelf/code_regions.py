@@ -2,7 +2,8 @@
 
 Bars and modules have edges everywhere, and all of them run along or across the code; gravel has them in
 every direction, a rack's beams have few.  The measure is that of the structure tensor with four-fold
-symmetry, |mean(g^4 / |g|^2)| / mean(|g|^2) for the gradient g as a complex number.
+symmetry, |mean(g^4 / |g|^2)| / mean(|g|^2) for the gradient g as a complex number.  Where there are fewer
+edges than a code has, of whatever direction, nobody need look for one.
 """
 
 from __future__ import annotations
@@ -119,11 +120,9 @@ class CodeSearch:
     """Where codes may be in a picture, `grey` (H, W)."""
 
     def __init__(self, grey: Image) -> None:
-        height, width = self._shape = grey.shape
-        even = grey[: height // 2 * 2, : width // 2 * 2]
-        half = cv2.resize(even, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+        self._shape = grey.shape
         # fine modules are dense edges at full size only, large ones at half size only
-        layers = _layer(grey, 1, _MIN_DENSITY), _layer(np.asarray(half, np.uint8), 2, _MIN_DENSITY_HALF)
+        layers = _layer(grey, 1, _MIN_DENSITY), _layer(shrunk(grey, 2), 2, _MIN_DENSITY_HALF)
         self._layers = [layer for layer in layers if layer is not None]
 
     def busy(self) -> list[CodeRegion] | None:
@@ -151,6 +150,15 @@ class CodeSearch:
     def _clipped(self, r: CodeRegion) -> CodeRegion:
         height, width = self._shape
         return CodeRegion(max(0, r.x0), max(0, r.y0), min(width, r.x1), min(height, r.y1), r.evidence)
+
+
+def shrunk(grey: Image, times: int) -> Image:
+    """(H // times, W // times) of a picture (H, W): the mean of each square; empty where there is none."""
+    height, width = (side // times for side in grey.shape)
+    if not height or not width:
+        return np.empty((height, width), np.uint8)
+    even = grey[: height * times, : width * times]
+    return np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _surroundings(corners: Matrix) -> CodeRegion:
@@ -199,9 +207,9 @@ def _merged(regions: list[CodeRegion]) -> list[CodeRegion]:
     return merged
 
 
-def _layer(grey: Image, shrunk: int, least_density: float) -> _Layer | None:
-    """The edges of a picture that is `shrunk`; None where it is too small to have any."""
-    step = math.ceil(max(grey.shape) / _SAMPLES)
+def _layer(grey: Image, times: int, least_density: float) -> _Layer | None:
+    """The edges of a picture that is shrunk so many times; None where it is too small to have any."""
+    step = max(math.ceil(max(grey.shape) / _SAMPLES), 1)
     if min(grey.shape) < 3 * step:
         return None
     rows, columns = slice(1, -1, step), slice(1, -1, step)
@@ -213,4 +221,4 @@ def _layer(grey: Image, shrunk: int, least_density: float) -> _Layer | None:
     levels = cv2.subtract(cv2.dilate(middles, window), cv2.erode(middles, window)).astype(np.float32)
     edge = xx + yy > np.square(np.maximum(_MIN_STEP, _MIN_RELATIVE_STEP * levels))
     density = np.asarray(cv2.blur(edge.astype(np.float32), (_WINDOW, _WINDOW)), np.float32)
-    return _Layer(density, (xx, yy, xy), step * shrunk, least_density)
+    return _Layer(density, (xx, yy, xy), step * times, least_density)

@@ -111,6 +111,11 @@ def test_only_where_there_are_edges_enough_for_a_code_is_looked_for_one() -> Non
     assert texts(large) == ["here"]
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (2, 900), (3, 3), (700, 1)])
+def test_a_picture_too_small_for_a_code_has_none(shape: tuple[int, int]) -> None:
+    assert texts(np.full(shape, 110, np.uint8)) == []
+
+
 def test_a_small_picture_is_looked_at_whole() -> None:
     assert CodeSearch(np.full((480, 640), 110, np.uint8)).busy() is None
 
