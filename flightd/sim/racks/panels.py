@@ -111,10 +111,22 @@ class Pane:
 
     def panel(self, panel: Panel, texture: Callable[[], Texture], tone: tuple[float, float, float]) -> None:
         """Draw a panel over what is there; from afar in one tone, without asking for its picture."""
-        pixels = self.footprint(panel.corners())
+        size_m = abs(panel.right_m - panel.left_m), panel.high_m - panel.low_m
+        self.sheet(panel.corners(), size_m, texture, tone)
+
+    def sheet(
+        self,
+        corners_m: Matrix,
+        size_m: tuple[float, float],
+        texture: Callable[[], Texture],
+        tone: tuple[float, float, float],
+    ) -> None:
+        """Draw as `panel` what stands in any plane: a picture of this size (across, down) between (4, 3) map
+        points, from its top left clockwise."""
+        pixels = self.footprint(corners_m)
         if pixels is None:
             return
-        width_m, height_m = abs(panel.right_m - panel.left_m), panel.high_m - panel.low_m
+        width_m, height_m = size_m
         across = max(math.dist(pixels[0], pixels[1]), math.dist(pixels[3], pixels[2])) / width_m
         down = max(math.dist(pixels[0], pixels[3]), math.dist(pixels[1], pixels[2])) / height_m
         if min(across, down) < _LEAST_PX_PER_M:

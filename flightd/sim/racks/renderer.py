@@ -6,6 +6,8 @@ blurred, lit and made noisy as a sensor does.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
@@ -39,7 +41,15 @@ class FrontRenderer:
     A picture depends on the site, the camera, the look, the seed, the pose and `seq` alone, not on what
     was rendered before.  Not for use from several threads at once."""
 
-    def __init__(self, site: Site, camera: FrontCamera, look: RackAppearance, seed: int = 0) -> None:
+    def __init__(
+        self,
+        site: Site,
+        camera: FrontCamera,
+        look: RackAppearance,
+        seed: int = 0,
+        make_racks: Callable[..., Racks] = Racks,
+    ) -> None:
+        """`make_racks` makes what is drawn, as `Racks`."""
         self._camera = camera
         focal_px = camera.lens.fx_px
         stock_seed = seed if look.seed is None else look.seed
@@ -50,7 +60,7 @@ class FrontRenderer:
             distance_m = abs(location.y_m - site.nodes[location.node].y_m)
             return focal_px / max(distance_m, 0.1) if look.location_labels else None
 
-        self._racks = Racks(faces(site), places, density, stock_seed)
+        self._racks = make_racks(faces(site), places, density, stock_seed)
         self._look = look
         self._sensor = Sensor(camera.lens, _sensor_look(look), seed + 1)
         self._ideal, self._bend = _ideal_lens(camera.lens)

@@ -1,18 +1,20 @@
 """Codes in a picture: every symbology zxing-cpp knows, looked for again where something looks like a code.
 
-The first look is at the whole picture as it is.  Only where dense perpendicular edges say that a code may
-be (`code_regions`) and none was read, the region is looked at again: inverted, enlarged, shrunk, with local
-contrast, sharpened, smoothed, turned.  A read is believed when error correction or a checksum vouches for
-it; a checksum of one digit found in an altered picture, and symbologies without any, need a second look
-that agrees.  Two believed texts at one place contradict each other, and then neither counts.  What is still
-not read and has bars one way is fitted as a blurred EAN-13 (`blurred_ean`).
+The first look is at the picture as it is, wherever it has edges enough for a code.  Only where dense
+perpendicular edges say that one may be (`code_regions`) and none was read, the region is looked at again:
+turned upright, inverted, enlarged, shrunk, with local contrast, sharpened, smoothed.  A read is believed when
+error correction or a checksum vouches for it; a checksum of one digit found in an altered picture, and
+symbologies without any, need a second look that agrees.  Two believed texts at one place contradict each
+other, and then neither counts.  What is still not read and has bars one way is fitted as a blurred EAN-13
+(`blurred_ean`).
 """
 
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -22,9 +24,10 @@ from flightd.core.geometry import Matrix
 from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf.blurred_ean import read_blurred_ean
 from flightd.vision.shelf.code_modules import module_px, qr_version
-from flightd.vision.shelf.code_regions import CodeRegion, code_regions
+from flightd.vision.shelf.code_regions import CodeRegion, CodeSearch, shrunk
 from flightd.vision.shelf.crease_flattening import flatten_qr
 from flightd.vision.shelf.digital_link import parse_digital_link
+from flightd.vision.shelf.edge_turn import edges_turn_rad
 from flightd.vision.shelf.gs1 import Gs1Error, parse_element_string
 
 
@@ -47,10 +50,12 @@ _CHECKED_RETAIL = frozenset(("EAN-13", "UPC-A"))
 
 @dataclass(frozen=True, slots=True)
 class _Look:
-    """One more way of looking at a region: scaled, turned, altered, negative."""
+    """One more way of looking at a region: scaled, turned, altered, negative.  `upright` turns it back by as
+    much as its edges are turned."""
 
     scale: float = 1.0
     turn_deg: float = 0.0
+    upright: bool = False
     alter: Callable[[Image], Image] | None = None
     global_threshold: bool = False
 
@@ -81,7 +86,9 @@ def _without_specks(grey: Image) -> Image:
 
 _LOOKS = (
     _Look(),
+    _Look(upright=True),
     _Look(2.0),
+    _Look(1.5, upright=True),
     _Look(0.5),
     _Look(1.5, alter=_local_contrast),
     _Look(1.0, 30.0),
@@ -106,6 +113,9 @@ _LARGEST_LOOK_PX = 1000
 """Enlarged views longer than this would cost more than they show."""
 _MOST_PIXELS = 5_000_000
 """What the second looks at one picture may scan together: bounds the time on pictures full of texture."""
+_LEAST_TURN_RAD = math.radians(4.0)
+"""Edges that are turned by less are upright: a level line still crosses all bars of most labels."""
+_SHRUNK = 4
 _SMALLEST_PX = 16
 """Shorter side of a view worth scanning."""
 _MOST_DAMAGED = 2
@@ -162,17 +172,34 @@ def read_codes(picture: Image, *, deeper: bool = True) -> tuple[CodeRead, ...]:
     """
     grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture, np.uint8)
     found: list[_Candidate] = []
-    _collect(found, _scan(grey, try_invert=False), np.eye(3), 0)
+    search = CodeSearch(grey)
+    busy = search.busy()
+    for view, picture_from_view in _first_views(grey, busy):
+        codes = _scan(view, try_invert=False, try_downscale=busy is None)
+        _collect(found, codes, picture_from_view, 0)
     if deeper:
         budget = _MOST_PIXELS
         doubtful = [_around(c, grey.shape[1], grey.shape[0]) for c in found if not c.believed]
-        for region in doubtful + code_regions(grey):
-            if not _is_read(region, found):
-                budget = _look_again(grey, region, found, budget)
+        known = [candidate for candidate in found if candidate.believed]
+        for region in doubtful + search.regions([candidate.corners for candidate in known]):
+            if not _is_read(region, found, known):
+                budget = _look_again(grey, region, found, known, budget)
     kept = _without_contradictions(found)
     height, width = grey.shape
     reads = [_code_read(candidate, width, height) for candidate in kept]
     return tuple(sorted(reads, key=lambda read: (not read.believed, min(y for _, y in read.corners_px))))
+
+
+def _first_views(grey: Image, busy: Sequence[CodeRegion] | None) -> Iterator[tuple[Image, Matrix]]:
+    """What the first look is at: the whole, or its busy boxes, and all of it shrunk for what is large there;
+    with the (3, 3) map from each view's pixels to the picture's."""
+    if busy is None:
+        yield grey, np.eye(3)
+        return
+    for box in busy:
+        yield _part(grey, box), _picture_from_part(box)
+    middle = (_SHRUNK - 1) / 2
+    yield shrunk(grey, _SHRUNK), np.array([[_SHRUNK, 0, middle], [0, _SHRUNK, middle], [0, 0, 1.0]])
 
 
 def _scan(
@@ -180,6 +207,7 @@ def _scan(
     binarizer: zxingcpp.Binarizer = zxingcpp.Binarizer.LocalAverage,
     *,
     try_invert: bool = True,
+    try_downscale: bool = True,
     return_errors: bool = False,
 ) -> list[zxingcpp.Barcode]:
     if min(grey.shape) < _SMALLEST_PX:
@@ -189,36 +217,52 @@ def _scan(
         text_mode=zxingcpp.TextMode.Plain,
         binarizer=binarizer,
         try_invert=try_invert,
+        try_downscale=try_downscale,
         return_errors=return_errors,
     )
     return list(codes)
 
 
-def _is_read(region: CodeRegion, found: Iterable[_Candidate]) -> bool:
-    return any(candidate.believed and candidate.inside(region) for candidate in found)
+def _part(grey: Image, region: CodeRegion) -> Image:
+    return np.ascontiguousarray(grey[region.y0 : region.y1, region.x0 : region.x1])
 
 
-def _look_again(grey: Image, region: CodeRegion, found: list[_Candidate], budget: int) -> int:
-    """Try every look on a region until something inside is believed, or the budget of pixels is spent;
-    returns what is left of it."""
-    crop = np.ascontiguousarray(grey[region.y0 : region.y1, region.x0 : region.x1])
+def _picture_from_part(region: CodeRegion) -> Matrix:
+    """The (3, 3) map from the pixels of a part to the picture's."""
+    return np.array([[1.0, 0, region.x0], [0, 1.0, region.y0], [0, 0, 1.0]])
+
+
+def _is_read(region: CodeRegion, found: Iterable[_Candidate], known: Sequence[_Candidate]) -> bool:
+    """Whether something inside is believed that was not `known` before."""
+    new = (one for one in found if not any(one is other for other in known))
+    return any(candidate.believed and candidate.inside(region) for candidate in new)
+
+
+def _look_again(
+    grey: Image, region: CodeRegion, found: list[_Candidate], known: Sequence[_Candidate], budget: int
+) -> int:
+    """Try every look on a region until something inside is believed that is not `known`, or the budget of
+    pixels is spent; returns what is left of it."""
+    crop = _part(grey, region)
     damaged: list[tuple[Image, Matrix, zxingcpp.Barcode]] = []
-    for number, look in enumerate(_LOOKS, start=1):
+    turn_rad = edges_turn_rad(crop, _LEAST_TURN_RAD)
+    for number, one in enumerate(_LOOKS, start=1):
+        if one.upright and turn_rad is None:
+            continue
+        look = replace(one, turn_deg=math.degrees(turn_rad or 0.0)) if one.upright else one
         if max(crop.shape) * look.scale > _LARGEST_LOOK_PX or min(crop.shape) * look.scale < _SMALLEST_PX:
             continue
         view, picture_from_view = _view(crop, look)
         budget -= view.size
         if budget < 0:
             break
-        picture_from_view = (
-            np.array([[1.0, 0, region.x0], [0, 1.0, region.y0], [0, 0, 1.0]]) @ picture_from_view
-        )
+        picture_from_view = _picture_from_part(region) @ picture_from_view
         binarizer = zxingcpp.Binarizer
         chosen = binarizer.GlobalHistogram if look.global_threshold else binarizer.LocalAverage
         codes = _scan(view, chosen, return_errors=True)
         _collect(found, codes, picture_from_view, number)
         damaged += [(view, picture_from_view, code) for code in codes if _is_damaged_qr(code)][:1]
-        if _is_read(region, found):
+        if _is_read(region, found, known):
             return budget
     if not _flatten_damaged(damaged, found):
         _read_blurred(crop, region, found)

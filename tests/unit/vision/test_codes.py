@@ -13,7 +13,7 @@ import zxingcpp
 
 from flightd.core.types import Image
 from flightd.vision.shelf.code_reader import read_codes
-from flightd.vision.shelf.code_regions import code_regions
+from flightd.vision.shelf.code_regions import CodeSearch
 
 PHOTOGRAPHS = Path(__file__).parents[4] / "shared" / "real" / "codes"
 LINES = PHOTOGRAPHS.parent / "lines"
@@ -76,6 +76,60 @@ def test_codes_are_read_however_they_are_turned(kind: str, turn_deg: float) -> N
     turn[:, 2] += 320 - width / 2, 320 - height / 2
     picture = cv2.warpAffine(code, turn, (640, 640), borderValue=255)
     assert texts(np.asarray(picture, np.uint8)) == [text]
+
+
+def low_bars(text: str, turn_deg: float, size: tuple[int, int], at: tuple[int, int]) -> Image:
+    """A label about `at` (x, y) whose bars are so low that, turned, no level line crosses all of them."""
+    code = label(text, "Code128", 3)
+    bars = np.pad(code[60:110, 10:-10], 10, constant_values=255)
+    height, width = bars.shape
+    turn = cv2.getRotationMatrix2D((width / 2, height / 2), turn_deg, 1.0)
+    turn[:, 2] += at[0] - width / 2, at[1] - height / 2
+    return np.asarray(cv2.warpAffine(bars, turn, size, borderValue=120), np.uint8)
+
+
+@pytest.mark.parametrize("turn_deg", [-17, -13, 14, 16, 104])
+def test_low_bars_are_read_tilted_beside_a_code_that_is_read_at_once(turn_deg: float) -> None:
+    picture = low_bars("BOX-4711", turn_deg, (700, 500), (330, 300))
+    picture[20:104, 560:644] = cv2.resize(label("AL-01", "DataMatrix", 2), (84, 84))
+    assert sorted(texts(picture)) == ["AL-01", "BOX-4711"]
+
+
+def test_only_where_there_are_edges_enough_for_a_code_is_looked_for_one() -> None:
+    large = np.full((900, 1200), 110, np.uint8)
+    cv2.rectangle(large, (100, 80), (1100, 820), 70, 30)
+    assert CodeSearch(large).busy() == []
+    code = qr("here", 4)
+    high, wide = code.shape
+    large[600 : 600 + high, 200 : 200 + wide] = code
+    found = CodeSearch(large).busy()
+    assert found is not None
+    (busy,) = found
+    assert (busy.x0, busy.y0) < (200, 600)
+    assert (busy.x1, busy.y1) > (200 + wide, 600 + high)
+    assert (busy.x1 - busy.x0) * (busy.y1 - busy.y0) < 0.1 * large.size
+    assert texts(large) == ["here"]
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (2, 900), (3, 3), (700, 1)])
+def test_a_picture_too_small_for_a_code_has_none(shape: tuple[int, int]) -> None:
+    assert texts(np.full(shape, 110, np.uint8)) == []
+
+
+def test_a_small_picture_is_looked_at_whole() -> None:
+    assert CodeSearch(np.full((480, 640), 110, np.uint8)).busy() is None
+
+
+@pytest.mark.parametrize("scale", [3, 4, 5, 6, 7, 8, 10, 14, 20])
+@pytest.mark.parametrize("kind", ["QRCode", "DataMatrix", "Code128", "EAN13"])
+def test_a_code_of_any_size_is_read_in_a_large_picture(kind: str, scale: int) -> None:
+    text = "9780679601050" if kind == "EAN13" else "BOX-4711"
+    code = cv2.GaussianBlur(label(text, kind, scale), (0, 0), 0.8)
+    room = 300, max(300, 1200 - code.shape[1])
+    large = np.pad(code, (room, room), constant_values=120)
+    large[::50] = 90  # edges all over, but no code
+    large[300 : 300 + code.shape[0], 300 : 300 + code.shape[1]] = code
+    assert texts(large) == [text]
 
 
 def test_a_negative_code_is_read() -> None:
@@ -169,11 +223,11 @@ def test_blur_may_hide_a_code_but_never_changes_it(kind: str, sigma_px: float) -
 def test_the_region_of_a_code_is_found_and_a_bare_shelf_has_none() -> None:
     picture = on_shelf(qr("where", 4), 400, 250)
     grey = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8)
-    (region,) = code_regions(grey)
+    (region,) = CodeSearch(grey).regions()
     assert region.contains(400 + 66, 250 + 66)
     assert (region.x1 - region.x0) * (region.y1 - region.y0) < 0.2 * grey.size
     bare = on_shelf(np.full((10, 10), 128, np.uint8), 0, 0)
-    assert code_regions(np.asarray(cv2.cvtColor(bare, cv2.COLOR_BGR2GRAY), np.uint8)) == []
+    assert CodeSearch(np.asarray(cv2.cvtColor(bare, cv2.COLOR_BGR2GRAY), np.uint8)).regions() == []
 
 
 @pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="the photographs are not beside this repository")
