@@ -1,37 +1,39 @@
 """How well it is told how full places are: rendered places against the truth of the simulator.
 
 `python -m tools.bench_fill --sites 6` prints the share of places within 10 points, of those unknown, and the
-worst.  `--aside 0.3` takes the pictures of each view from places so far apart along the aisle, as in passing.
+worst, and how many empty places were told as such.  `--aside 0.3` takes the pictures of each view from places
+so far apart along the aisle, and decides as in passing; `--pictures 8` so many, at most, of each.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import random
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
 
 from flightd.config.scan import ScanConfig
 from flightd.core.inventory import LocationState, PlaceFill
-from flightd.core.scanning import BodyPose
-from flightd.mission.scan.code_assignment import Assigner, FrontSight
+from flightd.core.scanning import BodyPose, Finding, PlaceLook
+from flightd.mission.scan.code_assignment import Assigner, FrontSight, PlacedRead
 from flightd.mission.scan.location_votes import LocationVotes
+from flightd.mission.scan.sweep_votes import SweepVotes, Undecided
 from flightd.mission.scan.views import View, ViewPlanner
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
-from flightd.sim.racks.stock import StockPlace, StockSituation, stock
+from flightd.sim.racks.stock import StockPlace, StockShares, StockSituation, stock
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
 from flightd.vision.shelf.shelf_look import read_shelf
 
 _SITE = Path(__file__).parents[1] / "configs" / "site-racks.toml"
-_PICTURES = 3
 _WITHIN = 0.10
 _EMPTY_SHARE = 0.02
 _EXPOSURES = (0.7, 0.85, 1.0)
@@ -39,11 +41,12 @@ _EXPOSURES = (0.7, 0.85, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """One place: what was told of it, its true share and overhang."""
+    """One place: what was told of it, its true share and overhang; `state` is None where it is looked at
+    again."""
 
     code: str
     seed: int
-    state: LocationState
+    state: LocationState | None
     fill: PlaceFill | None
     place: StockPlace
 
@@ -63,33 +66,89 @@ class Told:
         return max((-stack.recess_m for stack in goods.stacks), default=0.0) if goods is not None else 0.0
 
 
-def told_places(site: Site, seed: int, nodes: int, aside_m: float) -> Iterator[Told]:
+class StopVotes:
+    """The pictures of one place as a stop takes them: no more once it is decided."""
+
+    def __init__(self, code: str, node: str, params: ScanConfig) -> None:
+        self._votes = LocationVotes(code, node, params.pictures)
+        self._found: Finding | None = None
+
+    def add(self, number: int, pose: BodyPose, place: PlaceLook | None, reads: Sequence[PlacedRead]) -> None:
+        if self._found is None:
+            self._votes.add(number, pose, place, reads)
+            self._found = self._votes.finding(final=False)
+
+    def verdict(self) -> Finding | Undecided:
+        return self._found or self._votes.finding(final=True) or Undecided.UNSEEN
+
+
+class PassingVotes:
+    """The pictures of one place as they are taken in passing."""
+
+    def __init__(self, code: str, node: str, params: ScanConfig, at_m: tuple[float, float]) -> None:
+        self._votes = SweepVotes(code, node, params, 1.0)
+        self._x_m, self._y_m = at_m
+
+    def add(self, number: int, pose: BodyPose, place: PlaceLook | None, reads: Sequence[PlacedRead]) -> None:
+        bearing_rad = math.atan2(self._x_m - pose.x_m, abs(self._y_m - pose.y_m))
+        self._votes.add(number, pose, place, reads, bearing_rad=bearing_rad)
+
+    def verdict(self) -> Finding | Undecided:
+        return self._votes.verdict()
+
+
+@dataclass(frozen=True, slots=True)
+class Looks:
+    """How places are looked at: at `nodes` of a site, by so many `pictures` of a view, `aside_m` apart; so
+    large a part of the places is `empty`."""
+
+    nodes: int = 2
+    pictures: int = 3
+    aside_m: float = 0.0
+    empty: float = StockShares().empty
+    params: ScanConfig = field(default_factory=lambda: ScanConfig(max_height_m=4.0))
+
+    def votes(self, site: Site, code: str, node: str) -> StopVotes | PassingVotes:
+        if not self.aside_m:
+            return StopVotes(code, node, self.params)
+        location = site.locations[code]
+        return PassingVotes(code, node, self.params, (location.x_m, location.y_m))
+
+
+def told_places(site: Site, seed: int, looks: Looks) -> Iterator[Told]:
     """What is told of all places of some nodes of a site, its goods drawn by the seed."""
     camera, rng = FrontCamera(), random.Random(seed)
     look = replace(
-        RackAppearance(), in_part=0.75, exposure=rng.choice(_EXPOSURES), noise=rng.choice((2.0, 3.0))
+        RackAppearance(),
+        shares=StockShares(empty=looks.empty),
+        in_part=0.75,
+        exposure=rng.choice(_EXPOSURES),
+        noise=rng.choice((2.0, 3.0)),
     )
     places = stock(site, look.shares, camera.lens.fx_px, seed, look.in_part)
     sight = FrontSight(camera.lens, camera.mount)
     assigner = Assigner(site, sight)
-    planner = ViewPlanner(site, sight, assigner, ScanConfig(max_height_m=4.0))
+    planner = ViewPlanner(site, sight, assigner, looks.params)
     renderer = FrontRenderer(site, camera, look, seed)
-    for node in rng.sample(sorted(site.nodes), nodes):
+    for node in rng.sample(sorted(site.nodes), looks.nodes):
         for view in planner.views(node, frozenset(site.locations), 1.0, 0.0):
-            votes = {code: LocationVotes(code, node, _PICTURES) for code in view.locations}
-            for number in range(_PICTURES):
-                hover, pose = _poses(rng, view, number + 1, (number - _PICTURES // 2) * aside_m)
+            votes = {code: looks.votes(site, code, node) for code in view.locations}
+            for number in range(looks.pictures):
+                aside_m = (number - looks.pictures // 2) * looks.aside_m
+                hover, pose = _poses(rng, view, number + 1, aside_m)
                 picture = renderer.render(hover, number)
                 codes, _ = read_shelf(picture, number, number, assigner.places(pose, view.locations))
                 seen = assigner.look(codes, pose, (view.aisle, view.side))
-                looks = {place.location: place for place in codes.places}
+                shown = {place.location: place for place in codes.places}
                 for code, vote in votes.items():
                     reads = [placed for placed in seen.reads if placed.location == code]
-                    vote.add(number, pose, looks.get(code), reads)
+                    vote.add(number, pose, shown.get(code), reads)
             for code, vote in votes.items():
-                finding = vote.finding(final=True)
-                if finding is not None:
-                    yield Told(code, seed, finding.state, finding.fill, places[code])
+                found = vote.verdict()
+                if isinstance(found, Finding):
+                    yield Told(code, seed, found.state, found.fill, places[code])
+                else:
+                    yield Told(code, seed, None, None, places[code])
 
 
 def _poses(rng: random.Random, view: View, stamp_ns: int, aside_m: float) -> tuple[Kinematics, BodyPose]:
@@ -118,7 +177,13 @@ def table(told: Sequence[Told]) -> list[str]:
     out = [one for one in told if one.fill is not None and one.fill.overhang_m is not None]
     outs = sorted(abs((one.fill.overhang_m or 0.0) - one.overhang_m) for one in out if one.fill is not None)
     standing = [one for one in plain if one.overhang_m > 0.0]
+    empty = [one for one in told if one.place.goods is None]
+    as_such = sum(one.state is LocationState.EMPTY for one in empty)
+    again = sum(one.state is None for one in empty)
+    wrong = sum(one.state is LocationState.EMPTY for one in told) - as_such
     lines = [
+        f"empty {len(empty)}, told as such {as_such} ({100 * as_such / max(len(empty), 1):.1f} %), looked at "
+        f"again {again}; told as empty though goods stand there {wrong}",
         f"places {len(told)}, of these {len(plain)} with goods in the light, or empty",
         f"share told {len(known)}, within 10 points {right} ({100 * right / max(len(known), 1):.1f} %)",
         f"unknown, of those in the light: {unknown} ({100 * unknown / max(len(plain), 1):.1f} %)",
@@ -137,22 +202,26 @@ def _cm(sizes_m: Sequence[float]) -> str:
 
 def _words(one: Told) -> str:
     situation: StockSituation = one.place.situation
-    return f"told {one.share}, true {one.place.fill:.2f}, {situation.value}, counted as {one.state.value}"
+    counted = one.state.value if one.state else "undecided"
+    return f"told {one.share}, true {one.place.fill:.2f}, {situation.value}, counted as {counted}"
 
 
 def main() -> None:
     """Render, tell, and print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser, usual = argparse.ArgumentParser(description=__doc__), Looks()
     parser.add_argument("--sites", type=int, default=6, help="so many times the goods are drawn anew")
-    parser.add_argument("--nodes", type=int, default=2, help="nodes of each")
+    parser.add_argument("--nodes", type=int, default=usual.nodes, help="nodes of each")
     parser.add_argument("--seed", type=int, default=100, help="of the first")
     parser.add_argument("--aside", type=float, default=0.0, help="metres between the pictures of a view")
+    parser.add_argument("--pictures", type=int, default=usual.pictures, help="of each view, at most")
+    parser.add_argument("--empty", type=float, default=usual.empty, help="part of the places that is empty")
     asked = parser.parse_args()
     cv2.setNumThreads(1)
     site, begun = load_site(_SITE), time.process_time()
+    looks = Looks(asked.nodes, asked.pictures, asked.aside, asked.empty)
     told: list[Told] = []
     for seed in range(asked.seed, asked.seed + asked.sites):
-        told += told_places(site, seed, asked.nodes, asked.aside)
+        told += told_places(site, seed, looks)
         print(f"seed {seed}: {len(told)} places, {time.process_time() - begun:.0f} s", flush=True)
     print("\n".join(table(told)))
 

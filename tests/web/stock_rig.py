@@ -12,7 +12,7 @@ import segno
 from mcap.writer import Writer
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation
+from flightd.core.inventory import CountPose, LocationState, Observation, PlaceFill, PlannedLocation
 from flightd.core.topics import Topic
 from flightd.core.types import CodeRead
 from flightd.site.site import Site
@@ -49,9 +49,15 @@ def code(text: str, *gs1: tuple[str, str]) -> CodeRead:
 
 
 def look(
-    location: str, state: LocationState, *reads: CodeRead, run: str = RUN, at_s: int = 0, evidence: str = ""
+    location: str,
+    state: LocationState,
+    *reads: CodeRead,
+    run: str = RUN,
+    at_s: int = 0,
+    evidence: str = "",
+    fill: PlaceFill | None = None,
 ) -> Observation:
-    return Observation(run, location, _NS + at_s * 10**9, state, 0.98, reads, POSE, evidence)
+    return Observation(run, location, _NS + at_s * 10**9, state, 0.98, reads, POSE, evidence, fill=fill)
 
 
 def counted_store(folder: Path) -> None:
@@ -63,9 +69,10 @@ def counted_store(folder: Path) -> None:
         kept = store.keep_evidence(picture_of(f"00{SSCC}"))
         store.commit(look("AL-01-1-1", LocationState.UNREADABLE, run="2026-W46", at_s=-604_800))
         store.commit(look("AL-01-1-1", LocationState.READ, code(f"00{SSCC}", ("00", SSCC)), evidence=kept))
-        store.commit(look("AL-01-2-1", LocationState.READ, code("4006381333931")))
+        filled = PlaceFill(0.625, 0.04)
+        store.commit(look("AL-01-2-1", LocationState.READ, code("4006381333931"), fill=filled))
         store.commit(look("AL-02-1-1", LocationState.EMPTY))
-        store.commit(look("AL-02-2-1", LocationState.UNREADABLE))
+        store.commit(look("AL-02-2-1", LocationState.UNREADABLE, fill=PlaceFill(None)))
         store.commit(look("AL-03-1-1", LocationState.OCCLUDED))
         store.commit(look("AL-03-2-1", LocationState.SEVERAL, code("PAL-7/L1"), code("PAL-8/L1")))
         store.commit(look("AL-04-1-1", LocationState.READ, code("PAL-9/L1")), confirmed=False)

@@ -92,6 +92,19 @@ def test_a_click_shows_picture_outline_code_and_history(browser: Browser, unchan
         expect(card).to_be_hidden()
 
 
+def test_a_place_says_how_full_it_is_or_that_nobody_knows(browser: Browser, unchanged: str) -> None:
+    with opened(browser, unchanged) as page:
+        for place, told in {
+            "AL-01-2-1": ["Filled63 %", "Overhang0.04 m", "Confidence98 %"],
+            "AL-02-2-1": ["Filledunknown", "Confidence98 %"],
+            "AL-01-1-1": ["Confidence98 %"],
+        }.items():
+            cell(page, place).click()
+            facts = page.get_by_role("region", name=place).locator("dl > div")
+            expect(facts).to_contain_text([*told, "Looked at"])
+            expect(facts).to_have_count(len(told) + 3)
+
+
 def test_it_is_walked_and_searched_by_keys_alone(browser: Browser, url: str) -> None:
     with opened(browser, url) as page:
         expect(cell(page, "AL-01-2-1")).to_be_visible()

@@ -16,7 +16,7 @@ import msgspec
 import pytest
 
 from flightd.adapters.ground_link.client import Address
-from flightd.core.inventory import LocationState, Standing
+from flightd.core.inventory import LocationState, PlaceFill, Standing
 from flightd.ground.access import access
 from flightd.ground.access.key_book import KeyBook, Scope
 from flightd.ground.access.passwords import hashed_secret, new_key
@@ -202,6 +202,26 @@ async def test_a_drone_delivers_over_http_once(hall: Path, tmp_path: Path) -> No
         assert (status, "not a batch" in told["refused"]) == (400, True)
         assert (await program.post("/deliveries/missing-pictures", {"names": ["../etc"]}))[0] == 400
         assert (await program.get("/sites"))[0] == 403
+
+
+@in_real_time
+async def test_a_drone_that_does_not_tell_how_full_places_are_delivers_as_before(
+    hall: Path, tmp_path: Path
+) -> None:
+    fill = PlaceFill(0.5, 0.04)
+    seen = [look(place, LocationState.READ, code("PAL-1"), fill=fill) for place in ("B-1", "B-2")]
+    sent = Batch(SITE, "north", looks=tuple(SentLook(one, Standing.CONFIRMED) for one in seen))
+    older = msgspec.to_builtins(sent)
+    del older["looks"][0]["observation"]["fill"]
+    async with asked(hall, tmp_path / "state", Scope.DELIVER, Scope.STOCK) as program:
+        assert (await program.post("/deliveries", older))[1]["new"] == 2
+        fills = {row["location"]: row["fill"] for row in (await program.page(f"/stock?{_QUERY}"))["rows"]}
+        assert (fills["B-1"], fills["B-2"]) == (None, {"share": 0.5, "overhang_m": 0.04})
+        (row,) = (await program.page(f"/history?{_QUERY}&location=B-2"))["rows"]
+        assert row["fill"] == fills["B-2"]
+        older["looks"][0]["observation"]["fill"] = {"share": 1.5, "overhang_m": None}
+        status, told = await program.post("/deliveries", older)
+        assert (status, "a share of 1.5 outside 0..1" in told["refused"]) == (400, True)
 
 
 def test_the_station_feeds_what_changes_and_no_more(

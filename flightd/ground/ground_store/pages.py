@@ -12,7 +12,7 @@ from flightd.ground.ground_store.engine import Row, Session
 
 MOST_ROWS = 1000
 _STOCK = (
-    "SELECT place.code, node, state, texts, place.utc_ns, run.name, confidence, evidence"
+    "SELECT place.code, node, state, texts, place.utc_ns, run.name, confidence, evidence, fill"
     " FROM place LEFT JOIN run ON run.id = place.run"
 )
 _DIFFERENCES = (
@@ -22,7 +22,8 @@ _DIFFERENCES = (
 _LOOKS = (
     "SELECT observation.utc_ns, observation.id, place.code, run.name, observation.state,"
     " observation.confidence, standing, observation.node, x_m, y_m, height_m, yaw_rad, observation.evidence,"
-    " reads FROM observation JOIN place ON place.id = observation.place JOIN run ON run.id = observation.run"
+    " reads, observation.fill FROM observation JOIN place ON place.id = observation.place"
+    " JOIN run ON run.id = observation.run"
 )
 
 
@@ -84,7 +85,7 @@ def stock(
         f"{_STOCK} WHERE place.site = ?{where} AND place.code > ? ORDER BY place.code LIMIT ?",
         site, *values, after, limit,
     )  # fmt: skip
-    names = ("location", "node", "state", "texts", "utc_ns", "run", "confidence", "evidence")
+    names = ("location", "node", "state", "texts", "utc_ns", "run", "confidence", "evidence", "fill")
     return [_document(names, row) for row in rows]
 
 
@@ -169,14 +170,14 @@ def _only(found: list[Row], otherwise: str) -> int:
 def _document(names: tuple[str, ...], row: Row) -> dict[str, Any]:
     document = {}
     for name, value in zip(names, row, strict=True):
-        shown = json.loads(value) if name.endswith("texts") else value
+        shown = json.loads(value) if value is not None and name.endswith(("texts", "fill")) else value
         document[name] = value.hex() if isinstance(value, bytes) else shown
     return document
 
 
 def _look(row: Row) -> dict[str, Any]:
     utc_ns, identity, code, run, state, confidence, standing, node, x_m, y_m, height_m, yaw_rad, *rest = row
-    evidence, reads = rest
+    evidence, reads, fill = rest
     return {
         "id": identity.hex(),
         "utc_ns": utc_ns,
@@ -189,6 +190,7 @@ def _look(row: Row) -> dict[str, Any]:
         if node is None
         else {"node": node, "x_m": x_m, "y_m": y_m, "height_m": height_m, "yaw_rad": yaw_rad},
         "evidence": None if evidence is None else evidence.hex(),
+        "fill": None if fill is None else json.loads(fill),
         "reads": [
             {"symbology": s, "text": text, "checksum": bool(sure), "agreeing": n, "quality": q, "gs1": gs1}
             for s, text, sure, n, q, gs1 in json.loads(reads)

@@ -11,12 +11,14 @@ from typing import Any
 from flightd.core.errors import InputError, UnavailableError, cannot_write
 from flightd.core.extras import missing_extra
 from flightd.ground.ground_store.engine import Engine, Row
+from flightd.ground.ground_store.fill_text import fill_of
 
 _PART = 10_000
 _LOOKS = (
     "SELECT observation.utc_ns, observation.id, site.name, run.name, place.code, observation.state,"
     " observation.confidence, standing, observation.node, x_m, y_m, height_m, yaw_rad, observation.evidence,"
-    " reads FROM observation JOIN place ON place.id = observation.place JOIN run ON run.id = observation.run"
+    " reads, observation.fill FROM observation JOIN place ON place.id = observation.place"
+    " JOIN run ON run.id = observation.run"
     " JOIN site ON site.id = run.site WHERE observation.run = ?"
     " AND (observation.utc_ns, observation.id) > (?, ?) ORDER BY observation.utc_ns, observation.id LIMIT ?"
 )
@@ -30,6 +32,7 @@ TABLES = {
         "utc": "TIMESTAMP_NS", "id": "VARCHAR", "site": "VARCHAR", "run": "VARCHAR", "location": "VARCHAR",
         "state": "VARCHAR", "confidence": "DOUBLE", "standing": "TINYINT", "node": "VARCHAR", "x_m": "DOUBLE",
         "y_m": "DOUBLE", "height_m": "DOUBLE", "yaw_rad": "DOUBLE", "evidence": "VARCHAR", "reads": "VARCHAR",
+        "fill_asked": "BOOLEAN", "fill": "DOUBLE", "overhang_m": "DOUBLE",
     },
     "differences": {
         "utc": "TIMESTAMP_NS", "observation": "VARCHAR", "site": "VARCHAR", "run": "VARCHAR",
@@ -84,8 +87,17 @@ def _rows(engine: Engine, table: str, runs: Sequence[int]) -> Iterator[Row]:
             mark: tuple[object, ...] = (-1, b"") if table == "observations" else ("",)
             question = _LOOKS if table == "observations" else _DIFFERENCES
             while part := session.rows(question, run, *mark, _PART):
-                yield from part
+                yield from part if table == "differences" else map(_with_fill, part)
                 mark = part[-1][:2] if table == "observations" else (part[-1][4],)
+
+
+def _with_fill(row: Row) -> Row:
+    """A look with a cell for each figure of how full its place is."""
+    *look, fill = row
+    told = fill_of(fill)
+    if told is None:
+        return (*look, False, None, None)
+    return (*look, True, told.share, told.overhang_m)
 
 
 def _write_csv(file: Path, rows: Iterator[Row]) -> int:

@@ -46,7 +46,8 @@ _AFTER = Parameter("after", "text", "`next` of the page before.")
 _AFTER_MARK = Parameter("after", "mark", "`next` of the page before.")
 _LOOK_FIELDS = {
     "id": "string", "utc": "time", "location": "string", "run": "string", "state": "state",
-    "confidence": "number", "standing": "string", "pose": "object?", "evidence": "string?", "reads": "array",
+    "confidence": "number", "standing": "string", "pose": "object?", "evidence": "string?", "fill": "fill?",
+    "reads": "array",
 }  # fmt: skip
 
 ENDPOINTS: Sequence[Endpoint] = (
@@ -58,7 +59,7 @@ ENDPOINTS: Sequence[Endpoint] = (
         lambda store, p: store.stock(p["site"], p["after"] or "", p["limit"], p["state"]),
         {
             "location": "string", "node": "string", "state": "state", "texts": "texts", "utc": "time?",
-            "run": "string?", "confidence": "number?", "evidence": "string?",
+            "run": "string?", "confidence": "number?", "evidence": "string?", "fill": "fill?",
         },
         "location",
     ),

@@ -17,6 +17,15 @@ _KINDS: dict[str, dict[str, Any]] = {
     "texts": {"type": "array", "items": {"type": "string"}},
     "time": {"type": "string", "format": "date-time"},
     "state": {"type": "string", "enum": list(STATES)},
+    "fill": {
+        "type": "object",
+        "description": "How full the place is, 0 to 1; null in it is unknown.",
+        "required": ["share", "overhang_m"],
+        "properties": {
+            "share": {"type": ["number", "null"], "minimum": 0, "maximum": 1},
+            "overhang_m": {"type": ["number", "null"], "exclusiveMinimum": 0},
+        },
+    },
     "change": {"type": "string", "enum": [change.value for change in CountChange]},
 }
 _PARAMETERS: dict[str, dict[str, Any]] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from flightd.core.inventory import LocationRecord, Observation
+from flightd.core.inventory import LocationRecord, Observation, PlaceFill
 from flightd.core.label_values import LEAST_CONFIDENCE, PlaceValue, told_number
 from flightd.core.utc_time import utc_text
 from flightd.inventory.place_values import code_values, place_values
@@ -33,7 +33,7 @@ def observation_json(seen: Observation, least_confidence: float = LEAST_CONFIDEN
         "state": seen.state.value,
         "confidence": seen.confidence,
         "evidence": seen.evidence,
-        "fill": seen.fill and {"share": seen.fill.share, "overhang_m": seen.fill.overhang_m},
+        "fill": seen.fill and fill_json(seen.fill),
         "pose": pose
         and {
             "node": pose.node,
@@ -55,6 +55,11 @@ def observation_json(seen: Observation, least_confidence: float = LEAST_CONFIDEN
             for read in seen.reads
         ],
     }
+
+
+def fill_json(fill: PlaceFill) -> dict[str, float | None]:
+    """How full a place is; null for what the pictures do not tell."""
+    return {"share": fill.share, "overhang_m": fill.overhang_m}
 
 
 def _value_json(stands: PlaceValue) -> dict[str, object]:

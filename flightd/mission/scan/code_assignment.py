@@ -26,8 +26,8 @@ _DEPTH_SIGMA_M = 0.05
 _TILT_SIGMA_RAD = math.radians(0.5)
 _HEIGHT_SIGMA_M = 0.03
 _LEAST_SHARE = 0.02
-_OPENING_SHARE, _LEAST_ROOM_M = 0.85, 0.1
-"""How full a place is, is asked where so much of its opening is in the picture, and if it is no lower."""
+_OPENING_SHARE = 0.85
+"""A place's opening is looked at where so much of it is in the picture."""
 _BAY_SHARE = 0.75
 """Part of a bay's width by which a location label must be off its place to contradict the map."""
 
@@ -207,7 +207,7 @@ def _opening(cell: Cell, view: CameraView) -> PlaceOpening | None:
     corners = np.array(cell.opening_m)
     width_m, height_m = cell.x1_m - cell.x0_m, cell.top_m - cell.deck_m
     pixels = view.project(corners)
-    if height_m < _LEAST_ROOM_M or not np.isfinite(pixels).all():
+    if height_m <= 0.0 or not np.isfinite(pixels).all():
         return None
     if _inside_share(pixels, view.lens) < _OPENING_SHARE:
         return None

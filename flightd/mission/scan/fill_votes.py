@@ -31,6 +31,12 @@ class FillVotes:
         if fill is not None:
             self._fills.append(fill)
 
+    @property
+    def sees_goods(self) -> bool:
+        """Whether most of the pictures that tell a share show goods anywhere in the opening."""
+        shares = [fill.share for fill in self._fills if fill.share is not None]
+        return bool(shares) and median(shares) >= _NOTHING
+
     def together(self, state: LocationState) -> PlaceFill | None:
         """What holds of a location of this state, None without any picture of its opening.  What contradicts
         the state is unknown: the state stands."""

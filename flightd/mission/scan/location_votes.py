@@ -58,6 +58,12 @@ class LocationVotes:
         return self._votes.any_read
 
     @property
+    def any_goods(self) -> bool:
+        """Whether the place is not empty whatever its middle shows: a code was read here, or most pictures
+        show goods in its opening."""
+        return self.any_read or self._fills.sees_goods
+
+    @property
     def exhausted(self) -> bool:
         """More pictures from the same place would show no more: codes are read, the rest is cut off."""
         return self.looks >= self._least and self._quiet >= 2 and bool(self._votes.believed())
@@ -109,7 +115,7 @@ class LocationVotes:
         if final:
             all_empty = self._empty_in_a_row == self.looks >= _LEAST_EMPTY
             enough = enough or all_empty or self._most_empty >= self._least
-        return enough and not self._votes.any_read and not any(self._seen[kind] for kind in _OCCUPIED)
+        return enough and not self.any_goods and not any(self._seen[kind] for kind in _OCCUPIED)
 
     @property
     def _enough(self) -> bool:

@@ -120,7 +120,7 @@ class SweepVotes:
     def _empty_after_all(self, found: Finding) -> Finding | None:
         """An empty place beside goods: where the picture's edge cuts it off, they look like its own."""
         enough = self._whole_empty >= self._params.sweep.unread_views and not self._whole_occupied
-        if not enough or self._votes.any_read:
+        if not enough or self._votes.any_goods:
             return None
         fill = self._votes.fill(LocationState.EMPTY)
         return replace(found, state=LocationState.EMPTY, confidence=SEEN_EMPTY, fill=fill)

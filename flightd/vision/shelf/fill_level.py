@@ -7,6 +7,7 @@ smaller than the opening, one that stands out looks larger (`front_depth`).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 import cv2
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from flightd.core.inventory import PlaceFill
 from flightd.core.scanning import PlaceOpening
 from flightd.core.types import Image
+from flightd.vision.shelf.deck_sight import deck_sight
 from flightd.vision.shelf.front_depth import FrontDepths
 from flightd.vision.shelf.goods_front import CLEAR_M, LOW_M, SIDE_DEPTH_M, equal_runs, fronts_m
 from flightd.vision.shelf.opening_raster import BELOW_M, COLUMN_M, ROW_M, deck_strip_m, opening_raster
@@ -24,8 +26,8 @@ Floats: TypeAlias = NDArray[np.float32]
 Box: TypeAlias = tuple[float, float, float, float]
 """Left, lower, right and upper end, metres from the opening's left end and above its deck."""
 
-_BURNT: Final = 250.0
-"""White that is so light may be lighter than the picture can say."""
+_BURNT, _BURNT_MORE = 250.0, 1.3
+"""White that is so light may be lighter than the picture can say: so much is taken for it."""
 _POST_M: Final = 0.05
 """So far an upright may reach into the opening."""
 _LEAST_COLUMNS: Final = 4
@@ -58,32 +60,68 @@ _SEAM_M: Final = 0.03
 """So near to a front's end nothing is looked for in the dark above it."""
 _LOOKED_M: Final = 0.3
 """So deep an empty deck has to be lit."""
+_LEAST_ROOM_M: Final = 0.1
+"""Of a lower opening it is not told how full it is."""
+_GOODS_M: Final = 0.05
+_GOODS_COLUMNS: Final = 4
+"""A front that is lower, or narrower, may be the deck itself or a stripe of light: goods are larger."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpeningLook:
+    """What one picture tells of an opening: how full it is, and whether it `is_clear`: its front is seen from
+    end to end, and goods are seen nowhere in it."""
+
+    fill: PlaceFill
+    is_clear: bool = False
+
+
+UNKNOWN: Final = OpeningLook(PlaceFill(None))
 
 
 def fill_level(
     picture: Image, opening: PlaceOpening, white: float, codes_m: Sequence[Box] = ()
-) -> PlaceFill | None:
+) -> OpeningLook:
     """How full a place is, from one picture, (H, W, 3) BGR, of that white level; `codes_m` are the codes in
-    it.  None where the picture does not show the opening."""
-    raster = opening_raster(picture, opening) if white < _BURNT else None
-    return None if raster is None else measure(raster, opening, white, codes_m)
+    it."""
+    raster = opening_raster(picture, opening) if white > 0.0 else None
+    if raster is None:
+        return UNKNOWN
+    is_burnt = white >= _BURNT
+    look = measure(raster, opening, white * _BURNT_MORE if is_burnt else white, codes_m, is_burnt=is_burnt)
+    is_whole = all(abs(x) <= picture.shape[1] / 2 for x, _ in opening.front_px)
+    is_known = not is_burnt and opening.height_m >= _LEAST_ROOM_M
+    return OpeningLook(look.fill if is_known else PlaceFill(None), look.is_clear and is_whole)
 
 
-def measure(raster: Image, opening: PlaceOpening, white: float, codes_m: Sequence[Box] = ()) -> PlaceFill:
-    """The same from the opening's raster."""
+def measure(
+    raster: Image,
+    opening: PlaceOpening,
+    white: float,
+    codes_m: Sequence[Box] = (),
+    *,
+    is_burnt: bool = False,
+) -> OpeningLook:
+    """The same from the opening's raster, which is all in the picture.  Where the white is a guess, as
+    `is_burnt` says, an opening is clear only if its deck is seen all over."""
     left, right = (round(_POST_M / COLUMN_M) if post else 0 for post in opening.posts)
     if raster.shape[1] - left - right < _LEAST_COLUMNS:
-        return PlaceFill(None)
+        return UNKNOWN
     columns = slice(left, raster.shape[1] - right)
     whole = raster.max(axis=2).astype(np.float32) / np.float32(white)
     deck = round(BELOW_M / ROW_M)
     above = whole[deck + round(CLEAR_M / ROW_M) :, columns]
     tops_m = fronts_m(above, opening, left)
     if any(_is_lost(code, whole[deck:], tops_m, left) for code in codes_m):
-        return PlaceFill(None)
+        return UNKNOWN
     room = whole[deck:, columns]
     if _unlit_part(room, tops_m, opening) > _UNLIT_PART or _blank_part(room, tops_m, opening) > _BLANK_PART:
-        return PlaceFill(None)
+        return UNKNOWN
+    sight = deck_sight(raster, white, opening)
+    goods = (tops_m >= _GOODS_M) & ~sight.past[columns]
+    if is_burnt:
+        goods |= ~sight.lit[columns]
+    is_clear = int(goods.sum()) < _GOODS_COLUMNS
     depths = FrontDepths(raster[:, columns], whole[:, columns], opening, tops_m < LOW_M)
     _, eye_m, before_m = opening.eye_m
     colours = np.maximum(raster[deck + round(CLEAR_M / ROW_M) :, columns], 1).astype(np.float32) / white
@@ -104,9 +142,9 @@ def measure(raster: Image, opening: PlaceOpening, white: float, codes_m: Sequenc
         doubt += width * COLUMN_M * perhaps_m
     whole_m2 = opening.width_m * opening.height_m
     if doubt > _DOUBT_PART * whole_m2:
-        return PlaceFill(None)
+        return OpeningLook(PlaceFill(None), is_clear)
     share = min(area / whole_m2, 1.0)
-    return PlaceFill(round(share, 3), round(out_m, 3) or None)
+    return OpeningLook(PlaceFill(round(share, 3), round(out_m, 3) or None), is_clear)
 
 
 def _without_top(colours: Floats, top_m: float, opening: PlaceOpening) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf import empty_deck as deck
 from flightd.vision.shelf.code_reader import read_codes
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg, picture_name
-from flightd.vision.shelf.fill_level import fill_level
+from flightd.vision.shelf.fill_level import OpeningLook, fill_level
 from flightd.vision.shelf.occupancy import judge, light_on, white_level
 from flightd.vision.shelf.opening_raster import onto_opening
 
@@ -95,26 +95,30 @@ def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> 
     jpeg = evidence_jpeg(np.ascontiguousarray(bgr[y0:y1, x0:x1])) if x1 > x0 and y1 > y0 else b""
     name = picture_name(jpeg) if jpeg else ""
     light = light_on(bgr[y0:y1, x0:x1], white)
-    fill = _fill(bgr, place, reads, white, occupancy)
+    opening = _opening(bgr, place, reads, white)
+    fill = None if opening is None else opening.fill
+    if occupancy is Occupancy.EMPTY:
+        if opening is not None and opening.is_clear:
+            fill = PlaceFill(0.0)
+        else:  # its middle is, and goods may stand beside that
+            occupancy = Occupancy.UNSURE
+    elif occupancy is Occupancy.COVERED and opening is not None:
+        fill = PlaceFill(None)
     return PlaceLook(place.location, place.quad_px, place.share, occupancy, name, light, fill), jpeg
 
 
-def _fill(
-    bgr: Image, place: Place, reads: Sequence[CodeRead], white: float, occupancy: Occupancy
-) -> PlaceFill | None:
-    """How full one place is, None where the picture does not show enough of its opening."""
+def _opening(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> OpeningLook | None:
+    """What is seen of a place from end to end, None where the picture does not show enough of its opening."""
     opening = place.opening
     if opening is None:
         return None
-    if occupancy is Occupancy.COVERED:
-        return PlaceFill(None)
     codes = []
     for read in reads:
         corners_m = onto_opening(np.array(read.corners_px), opening)
         (x0, low), (x1, high) = corners_m.min(axis=0), corners_m.max(axis=0)
         if x0 >= 0.0 and x1 <= opening.width_m and low >= 0.0 and high <= opening.height_m:
             codes.append((float(x0), float(low), float(x1), float(high)))
-    return fill_level(bgr, opening, white, codes) or PlaceFill(None)
+    return fill_level(bgr, opening, white, codes)
 
 
 def _is_inside(quad: Quad, width: int, height: int) -> bool:

@@ -5,9 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
+from flightd.core.scanning import Occupancy
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
+from flightd.sim.racks.stock import StockShares
 from flightd.sim.racks.stock_truth import stock_truth
 from flightd.site.site_file import load_site
 from flightd.vision.shelf.shelf_look import read_shelf
@@ -17,6 +21,25 @@ SITE = load_site(Path(__file__).parents[3] / "configs" / "site-racks-small.toml"
 CAMERA = FrontCamera()
 LOOK = replace(RackAppearance(), in_part=1.0)
 SEED = 31
+
+
+@pytest.mark.parametrize(
+    ("seed", "node", "aside"), [(22, "B4", "BR-04-1-2"), (91, "B4", "BR-04-2-1"), (94, "A3", "AL-03-2-2")]
+)
+def test_a_place_with_goods_at_its_sides_alone_is_not_taken_for_empty(
+    seed: int, node: str, aside: str
+) -> None:
+    look = replace(LOOK, shares=StockShares(empty=0.4, occluded=0.0, dark=0.0))
+    assigner = Assigner(SITE, FrontSight(CAMERA.lens, CAMERA.mount))
+    truth = stock_truth(SITE, look, CAMERA.lens.fx_px, seed)
+    shown: dict[str, Occupancy] = {}
+    for seen in shelf_pictures(SITE, CAMERA, look, seed, (node,)):
+        codes, _ = read_shelf(seen.picture, 0, 0, assigner.places(seen.pose, seen.view.locations))
+        shown |= {place.location: place.occupancy for place in codes.places}
+    assert truth[aside].fill > 0.0
+    assert shown[aside] is not Occupancy.EMPTY
+    empty = {code for code, occupancy in shown.items() if occupancy is Occupancy.EMPTY}
+    assert empty == {code for code in shown if truth[code].fill == 0.0}
 
 
 def test_how_full_places_are_is_told_within_ten_points() -> None:

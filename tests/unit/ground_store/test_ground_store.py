@@ -12,8 +12,16 @@ import duckdb
 import pytest
 
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, Standing
+from flightd.core.inventory import (
+    CountPose,
+    LocationState,
+    Observation,
+    PlaceFill,
+    PlannedLocation,
+    Standing,
+)
 from flightd.core.types import CodeRead
+from flightd.ground.ground_store import migrations
 from flightd.ground.ground_store.batch import Batch, SentDecision, SentFlight, SentLine, SentLook, SentPerson
 from flightd.ground.ground_store.engine import Engine
 from flightd.ground.ground_store.evidence import FolderEvidence
@@ -41,11 +49,12 @@ def look(
     standing: Standing = Standing.CONFIRMED,
     state: LocationState | None = None,
     evidence: str = "",
+    fill: PlaceFill | None = None,
 ) -> SentLook:
     known = (LocationState.EMPTY, LocationState.READ, LocationState.SEVERAL)[min(len(texts), 2)]
     pose = CountPose("A1", 0.25, -1.0, 0.9, -1.57)
     reads = tuple(map(read, texts))
-    seen = Observation(run, location, at_ns, state or known, 0.875, reads, pose, evidence)
+    seen = Observation(run, location, at_ns, state or known, 0.875, reads, pose, evidence, fill=fill)
     return SentLook(seen, standing)
 
 
@@ -77,6 +86,20 @@ def test_a_look_comes_back_as_it_was_seen(store: GroundStore) -> None:
     assert row["reads"][0]["gs1"] == [["00", "340123450002439853"]]
     assert (row["evidence"], row["confidence"], row["standing"]) == ("ab" * 32, 0.875, "confirmed")
     assert row["pose"] == {"node": "A1", "x_m": 0.25, "y_m": -1.0, "height_m": 0.9, "yaw_rad": -1.57}
+
+
+def test_how_full_a_place_is_stands_with_its_look_and_its_place(store: GroundStore) -> None:
+    fills = {
+        PlaceFill(0.625, 0.04): {"share": 0.625, "overhang_m": 0.04},
+        PlaceFill(None): {"share": None, "overhang_m": None},
+        None: None,
+    }
+    for day, fill in enumerate(fills):
+        store.take(batch(look("A-1", "PAL-1", run=f"run {day}", at_ns=_BEGIN + day * _DAY, fill=fill)))
+        assert store.stock(SITE)[0]["fill"] == fills[fill]
+    assert [row["fill"] for row in store.history(SITE, "A-1")] == [*reversed(fills.values())]
+    store.take(batch(look("A-1", "PAL-1", run="run 2", at_ns=_BEGIN + 2 * _DAY, standing=Standing.WITHDRAWN)))
+    assert store.stock(SITE)[0]["fill"] == fills[PlaceFill(None)]
 
 
 def test_the_same_look_counts_once_however_it_comes(store: GroundStore) -> None:
@@ -285,6 +308,25 @@ def test_a_store_of_a_newer_version_is_refused(engine: Callable[[], Engine], tmp
     )
 
 
+def test_a_store_from_before_places_told_how_full_they_are_is_taken_over(
+    engine: Callable[[], Engine], tmp_path: Path
+) -> None:
+    older = engine()
+    files = sorted((Path(migrations.__file__).parent / "migrations" / older.kind).iterdir())
+    with older.writing() as session:
+        older.version(session)
+        for file in files[:3]:
+            older.script(session, file.read_text(encoding="utf-8"))
+        older.set_version(session, 3)
+        session.run("INSERT INTO site (name) VALUES (?)", SITE)
+        session.run("INSERT INTO place (site, code, node, state) VALUES (1, ?, ?, ?)", "A-1", "A1", "empty")
+    older.close()
+    with GroundStore(engine(), FolderEvidence(tmp_path / "evidence")) as store:
+        assert [(row["state"], row["fill"]) for row in store.stock(SITE)] == [("empty", None)]
+        store.take(batch(look("A-1", "PAL-1", fill=PlaceFill(0.5))))
+        assert store.stock(SITE)[0]["fill"] == {"share": 0.5, "overhang_m": None}
+
+
 def test_a_database_that_cannot_be_had_is_told_in_a_line(tmp_path: Path) -> None:
     evidence = FolderEvidence(tmp_path)
     with pytest.raises(UnavailableError) as caught:
@@ -305,8 +347,10 @@ def _asked(question: str) -> list[tuple[Any, ...]]:
 
 
 def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> None:
-    store.take(batch(look("A-1", 'a"b,\n', run="monday"), look("A-2", standing=Standing.PENDING)))
-    store.take(batch(look("A-1", run="tuesday", at_ns=_BEGIN + _DAY + 7), look("A-9", "x")))
+    half, unknown = PlaceFill(0.5, 0.04), PlaceFill(None)
+    pending = look("A-2", standing=Standing.PENDING, fill=unknown)
+    store.take(batch(look("A-1", 'a"b,\n', run="monday"), pending))
+    store.take(batch(look("A-1", run="tuesday", at_ns=_BEGIN + _DAY + 7), look("A-9", "x", fill=half)))
     store.take(batch(look("A-1", "other"), site="hall 4"))
     assert store.export(SITE, tmp_path / "it's out") == {"observations": 4, "differences": 1}
     observations = str(tmp_path / "it's out" / "observations.parquet").replace("'", "''")
@@ -321,6 +365,8 @@ def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> No
     ]  # fmt: skip
     assert (told[0][:2], told[0][5], json.loads(told[0][6])[0][1]) == ((SITE, "monday"), None, 'a"b,\n')
     assert json.loads(told[2][6])[0][1] == "x"
+    filled = _asked(f"SELECT fill_asked, fill, overhang_m FROM '{observations}' ORDER BY utc, location")
+    assert filled == [(False, None, None), (True, None, None), (True, 0.5, 0.04), (False, None, None)]
     changed = _asked(f"SELECT location, change, before_texts FROM '{differences}'")
     assert changed == [("A-1", "gone", json.dumps(['a"b,\n']))]
     assert store.export("", tmp_path / "all")["observations"] == 5

@@ -40,6 +40,17 @@ def test_a_location_of_which_no_picture_shows_the_opening_is_not_asked() -> None
     assert votes.together(EMPTY) is None
 
 
+def test_goods_are_seen_where_most_pictures_that_tell_a_share_show_some() -> None:
+    votes = FillVotes()
+    assert not votes.sees_goods
+    for share in (0.0, 0.0, 0.2, None, None):
+        votes.add(PlaceFill(share))
+    assert not votes.sees_goods
+    for share in (0.1, 0.05):
+        votes.add(PlaceFill(share))
+    assert votes.sees_goods
+
+
 def test_an_overhang_is_told_where_most_pictures_show_it() -> None:
     votes = FillVotes()
     for overhang_m in (0.05, 0.07, None):

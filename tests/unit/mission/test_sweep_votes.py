@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightd.config.scan import ScanConfig
-from flightd.core.inventory import LocationState
+from flightd.core.inventory import LocationState, PlaceFill
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Occupancy, PlaceLook
 from flightd.mission.scan.code_assignment import Assigner, PlacedRead, ShelfLook
+from flightd.mission.scan.location_votes import LocationVotes
 from flightd.mission.scan.sweep_planner import SweepPlanner
 from flightd.mission.scan.sweep_task import SweepTask
 from flightd.mission.scan.sweep_votes import SweepVotes, Undecided
@@ -115,6 +116,25 @@ def test_empty_takes_as_many_views_as_at_a_stop() -> None:
     assert state(verdict(NOTHING, [UNSURE, EMPTY, EMPTY, EMPTY, UNSURE])) is LocationState.EMPTY
     assert not isinstance(verdict(NOTHING, [EMPTY, EMPTY]), Finding)
     assert not isinstance(verdict(NOTHING, [EMPTY, EMPTY, EMPTY, GOODS]), Finding)
+
+
+def test_no_place_is_empty_in_which_most_views_see_goods_beside_its_middle() -> None:
+    def seen(*views: tuple[Occupancy, float | None]) -> LocationState | Undecided:
+        votes = SweepVotes(CODE, "A2", PARAMS, 1.0)
+        stop = LocationVotes(CODE, "A2", PARAMS.pictures)
+        for seq, (occupancy, share) in enumerate(views):
+            look = PlaceLook(CODE, QUAD, 1.0, occupancy, f"picture {seq}", fill=PlaceFill(share))
+            votes.add(seq, pose(seq * 250_000_000), look, (), bearing_rad=math.radians(8.0 * seq))
+            stop.add(seq, pose(seq * 250_000_000), look, ())
+        told = stop.finding(final=True)
+        is_empty = told is not None and told.state is LocationState.EMPTY
+        found = state(votes.verdict())
+        assert is_empty == (found is LocationState.EMPTY)
+        return found
+
+    clear, aside, unknown = (EMPTY, 0.0), (UNSURE, 0.2), (UNSURE, None)
+    assert seen(clear, clear, clear, aside, aside, unknown) is LocationState.EMPTY
+    assert seen(aside, aside, clear, clear, clear, aside, aside) is Undecided.UNSURE
 
 
 def test_unreadable_takes_goods_enough_views_angles_and_light() -> None:

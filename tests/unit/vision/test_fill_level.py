@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flightd.core.scanning import PlaceOpening
 from flightd.core.types import Image
-from flightd.vision.shelf.fill_level import fill_level
+from flightd.vision.shelf.fill_level import OpeningLook, fill_level
 
 WIDTH_M, HEIGHT_M, BACK_M = 0.65, 0.6, 0.9
 EYE_M = (0.2, 0.28, 1.2)
@@ -80,16 +80,24 @@ class Shelf:
         return PlaceOpening(front, WIDTH_M, HEIGHT_M, EYE_M, (False, False))
 
 
+def seen(
+    shelf: Shelf, *, white: float = WHITE, codes: Sequence[tuple[float, ...]] = (), width_px: int = SIZE_PX[0]
+) -> OpeningLook:
+    """What the middle of the picture tells, so wide."""
+    noisy = shelf.picture + np.random.default_rng(2).normal(0.0, 2.0, shelf.picture.shape)
+    aside = (SIZE_PX[0] - width_px) // 2
+    picture: Image = np.clip(noisy, 0, 255).astype(np.uint8)[:, aside : SIZE_PX[0] - aside]
+    return fill_level(picture, shelf.opening(), white, [(a, b, c, d) for a, b, c, d in codes])
+
+
 def told(
     *boxes: Box, colour: Colour = FRONT, white: float = WHITE, codes: Sequence[tuple[float, ...]] = ()
 ) -> tuple[float | None, float | None]:
     shelf = Shelf()
     for box in boxes:
         shelf.box(box, colour)
-    noisy = shelf.picture + np.random.default_rng(2).normal(0.0, 2.0, shelf.picture.shape)
-    picture: Image = np.clip(noisy, 0, 255).astype(np.uint8)
-    fill = fill_level(picture, shelf.opening(), white, [(a, b, c, d) for a, b, c, d in codes])
-    return (None, None) if fill is None else (fill.share, fill.overhang_m)
+    fill = seen(shelf, white=white, codes=codes).fill
+    return fill.share, fill.overhang_m
 
 
 def share_of(*boxes: Box) -> float:
@@ -133,6 +141,32 @@ def test_an_empty_place_has_no_share_of_goods() -> None:
     assert told() == (0.0, None)
 
 
+def test_an_opening_is_clear_where_goods_are_seen_nowhere_between_its_ends() -> None:
+    assert seen(Shelf()).is_clear
+    for box in ((-0.31, -0.2, 0.3, 0.0), (0.2, 0.31, 0.12, 0.03)):
+        shelf = Shelf()
+        shelf.box(box)
+        assert not seen(shelf).is_clear
+    shelf = Shelf()
+    shelf.box((-0.3, -0.15, 0.3, 0.0), DARK)
+    assert not seen(shelf).is_clear
+
+
+def test_an_opening_is_not_clear_where_the_picture_cuts_it_off() -> None:
+    assert seen(Shelf(), width_px=840).is_clear
+    assert not seen(Shelf(), width_px=780).is_clear
+
+
+def test_the_hall_past_the_end_of_a_rack_is_no_goods_in_it() -> None:
+    shelf = Shelf()
+    end_m = -WIDTH_M / 2
+    hall = [(end_m, 0.0, 0.0), (end_m, 0.0, BACK_M), (end_m, HEIGHT_M, BACK_M), (end_m, HEIGHT_M, 0.0)]
+    shelf.area(hall, FRONT, grained=True)
+    assert seen(shelf).is_clear
+    shelf.box((end_m + 0.03, end_m + 0.15, 0.3, 0.0))
+    assert not seen(shelf).is_clear
+
+
 def test_goods_as_dark_as_the_rack_are_unknown() -> None:
     assert told((-0.3, 0.3, 0.5, 0.0), colour=DARK)[0] is None
 
@@ -168,5 +202,5 @@ def test_an_opening_of_any_size_and_from_anywhere_tells_a_share_or_nothing(
     picture: Image = np.ascontiguousarray(coarse.repeat(10, axis=0).repeat(10, axis=1))
     x, y = half_px
     front = ((-x, -y), (x, -y), (x, y), (-x, y))
-    fill = fill_level(picture, PlaceOpening(front, *size_m, eye_m, posts), 200.0, [(0.1, 0.1, 0.2, 0.2)])
-    assert fill is None or fill.share is None or 0.0 <= fill.share <= 1.0
+    look = fill_level(picture, PlaceOpening(front, *size_m, eye_m, posts), 200.0, [(0.1, 0.1, 0.2, 0.2)])
+    assert look.fill.share is None or 0.0 <= look.fill.share <= 1.0

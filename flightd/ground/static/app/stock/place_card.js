@@ -121,8 +121,10 @@ function Picture({ look, place }) {
 }
 
 function Facts({ look }) {
-  const { pose } = look;
+  const { pose, fill } = look;
   const facts = [
+    [say("Filled"), fill && (fill.share === null ? say("unknown") : `${decimal(100 * fill.share)} %`)],
+    [say("Overhang"), fill?.overhang_m && `${decimal(fill.overhang_m, 2)} m`],
     [say("Confidence"), `${Math.floor(look.confidence * 100)} %`],
     [say("Looked at"), when(look.utc)],
     [say("Run"), look.run],

@@ -1,0 +1,18 @@
+"""How full a place is as the text that the store keeps, and back."""
+
+from __future__ import annotations
+
+import json
+
+from flightd.core.inventory import PlaceFill
+from flightd.inventory.export.json_document import fill_json
+
+
+def fill_text(fill: PlaceFill | None) -> str | None:
+    """As `flightd inventory show --json` has it, None where it was not asked."""
+    return None if fill is None else json.dumps(fill_json(fill), separators=(",", ":"))
+
+
+def fill_of(text: str | None) -> PlaceFill | None:
+    """The same back."""
+    return None if text is None else PlaceFill(**json.loads(text))
