@@ -348,6 +348,7 @@ class Dispatcher:
         for drone in sorted(self._comes_back & self._charge.keys()):
             if self.control.drones[drone].doubt_m > 0.0:
                 continue
+            self._tries.clear()  # others may still come back, whose air is closed until then
             self._comes_back.discard(drone)
             most = min(shared, MOST_OF_TOUR) if self._shares else MOST_OF_TOUR
             may_work = bool(self.queue.open) and now_ms >= self._next_try_ms.get(drone, 0)

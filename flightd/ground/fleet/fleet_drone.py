@@ -7,7 +7,7 @@ import logging
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from flightd.adapters.ground_link.messages.floor import FloorStatus
@@ -82,6 +82,9 @@ class FleetDrone:
         self._sides = {(rack.aisle, rack.side) for rack in floor.racks}
         self._faces = {node.id: node.aisle for node in floor.nodes if node.levels}
         drone.on_decided = self._hear_decided
+        self._recalled: KeptDrone | None = None
+        self.may_start = True
+        """Whether it may leave the ground for what waits."""
 
     # what it tells
 
@@ -166,6 +169,7 @@ class FleetDrone:
             left_s = _FULL_S
         charge = RESERVE + left_s / FLIGHT_S
         ready = status is not None and CommandKind.START in status.possible and standing is not None
+        ready &= self.may_start
         if self.waits and not self._base and not ready:
             charge = 0.0  # nobody sends it anywhere
         self.air.doubt_m = self._doubt_m(status)
@@ -227,6 +231,8 @@ class FleetDrone:
         """A place of it, what it may be on, and by how much beside: near its own pad and another one that it
         tells."""
         air, floor = self.air, self.drone.floor
+        if self.drone.status is None:  # not heard by this station yet: it may be anywhere
+            return air.place, self._floor.everywhere, air.doubt_m
         if not self.objection or floor is None or not self._floor.is_of(floor):
             return air.place, air.closed, air.doubt_m
         over, beside_m = self._floor.beside(floor)
@@ -256,19 +262,28 @@ class FleetDrone:
 
     # what outlives the station
 
-    def kept(self, released: Sequence[Action] = ()) -> KeptDrone:
-        """What the next station has to know, with what it is about to be ordered."""
+    def kept(self, released: Sequence[Action] = (), *, paused: bool = False) -> KeptDrone:
+        """What the next station has to know, with what the drone is about to be ordered."""
         status, vehicle = self.drone.status, self.drone.vehicle
+        if self._recalled is not None and status is None:
+            return replace(self._recalled, session=self.drone.kept())
         base = [self._node_of(step) for step in (*self._base, *map(_Step, released))]
         told = () if status is None else status.way
         ways = (base, (vehicle.last_node, *vehicle.ahead), told) if base or not self.air.rests else ()
         known = tuple(tuple(node for node in way if node) for way in ways)
-        return KeptDrone(self.drone.kept(), self.air.kept(), tuple(way for way in known if way))
+        ordered = [f"{CommandKind.GOTO} {node}" for node in (vehicle.last_node, *vehicle.ahead, *base)]
+        if self.waits or status is None:
+            ordered += [CommandKind.PLAN, CommandKind.START]
+        if paused is not self._paused:
+            ordered.append(CommandKind.PAUSE if paused else CommandKind.RESUME)
+        return KeptDrone(
+            self.drone.kept(), self.air.kept(), tuple(way for way in known if way), tuple(ordered)
+        )
 
     def recall(self, kept: KeptDrone) -> None:
         """Go on with what the station before knew."""
-        nodes = {node for way in kept.ways for node in way}
-        self.drone.recall(kept.session, nodes)
+        self._recalled = kept
+        self.drone.recall(kept.session, kept.ordered)
         self.air.recall(kept.session.session, kept.air, kept.ways)
         self._was_taken = kept.session.taken
 

@@ -87,6 +87,11 @@ class FleetFloor:
         # who comes home in need flies against one-way lines, too
         self._ways = Ways(names, [*arcs, *((b, a, metres) for a, b, metres in arcs)])
 
+    @property
+    def everywhere(self) -> frozenset[int]:
+        """All the air there is."""
+        return frozenset(range(len(self.lanes.boxes)))
+
     def is_of(self, floor: FloorStatus) -> bool:
         """Whether a drone's map is this floor, but for pads."""
         return _without_pads(floor) == self._like

@@ -31,17 +31,21 @@ _SCHEMA = "CREATE TABLE kept (name TEXT PRIMARY KEY, json BLOB NOT NULL) STRICT"
 _WORK_LASTS_S: Final = 600.0
 """Nobody expects drones to leave for work that was asked for longer before the station began again."""
 _TELLS_S: Final = 60.0
+_WAITS_S: Final = 0.2
+"""For another process that reads it; orders wait so long."""
 TOO_OLD: Final = "the station was away for too long: ask for it again"
 _T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
 class KeptDrone:
-    """One drone: `ways` are those that it may fly, over nodes, by what it was released to and told."""
+    """One drone: `ways` are those that it may fly, over nodes, by what it was released to and told; `ordered`
+    are commands that it may be given by that."""
 
     session: KeptSession
     air: KeptAir
     ways: tuple[tuple[str, ...], ...] = ()
+    ordered: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +78,7 @@ class FleetMemory:
             application=_APPLICATION,
             version=_VERSION,
             schema=_SCHEMA,
+            timeout_s=_WAITS_S,
         )
         self._utc_s = utc_s
         self._newest: object = None
@@ -121,7 +126,7 @@ def _of_note(drone: KeptDrone) -> object:
     return replace(
         drone,
         session=replace(drone.session, event_seq=0),
-        air=replace(drone.air, at=None, doubt_m=0.0, place=0),
+        air=replace(drone.air, at=None, doubt_m=float(drone.air.doubt_m > 0.0), place=0),
     )
 
 

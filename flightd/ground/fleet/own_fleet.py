@@ -7,7 +7,7 @@ import asyncio
 import logging
 import math
 import uuid
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -21,7 +21,7 @@ from flightd.ground.access.roles import Identity, Role
 from flightd.ground.fleet.base_orders import VERSION
 from flightd.ground.fleet.fleet_drone import FleetDrone
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor
-from flightd.ground.fleet.fleet_memory import FleetMemory, KeptDrone, KeptFloor
+from flightd.ground.fleet.fleet_memory import FleetMemory, KeptDrone, KeptFleet, KeptFloor
 from flightd.ground.fleet.station_traffic import Aside, StationTraffic, pace_of
 from flightd.ground.hub import Hub
 from flightd.ground.messages import Act
@@ -58,6 +58,7 @@ class OwnFleet(VehicleSides):
         super().__init__({name: ManagedDrone(name, VERSION, measures, rules) for name in drones})
         for drone in self._drones.values():
             drone.at_broker = True  # who gives the orders is always there
+            drone.may_go_home = False  # until it is known who is in its way
         self._aside = aside
         self._fleet: tuple[FleetFloor, Mapping[str, FleetDrone], Pace] | None = None
         self._traffic: StationTraffic | None = None
@@ -111,10 +112,17 @@ class OwnFleet(VehicleSides):
         if hub is not None:
             ours = (hub.drones[name] for name, drone in self._drones.items() if drone.is_automatic)
             flying = [drone for drone in ours if drone.flies]
+            await self._keep_halts({drone.name for drone in flying})
             halts = [drone.act(_act(CommandKind.PAUSE), by_person=False) for drone in flying]
             for drone, came in zip(flying, await asyncio.gather(*halts, return_exceptions=True), strict=True):
                 if isinstance(came, BaseException):
                     _LOG.warning("%s: it was not halted: %s", drone.name, came)
+
+    async def _keep_halts(self, halted: Collection[str]) -> None:
+        if self._fleet is not None and self._told is None:
+            drones = self._fleet[1]
+            kept = {name: drone.kept(paused=name in halted) for name, drone in drones.items()}
+            await self._keep_in_mind(kept, self._queue)
 
     async def _control(self) -> None:
         loop = asyncio.get_running_loop()
@@ -152,22 +160,26 @@ class OwnFleet(VehicleSides):
         """Go on where the station before was ended, if it flew the same drones."""
         try:
             known = None if self._memory is None else await self._aside(self._memory.read)
-            if known is None:
-                return
-            floor, fleet = known
-            self._queue = WorkQueue.of(fleet.work)
-            if {*fleet.drones} != {*self._drones} or {*floor.floors} != {*self._drones}:
-                _LOG.warning("the fleet had other drones before: it flies once all told where they stand")
-                return
-            stands = {name: standing.node for name, standing in floor.standings.items()}
-            made = await self._aside(partial(FleetFloor, floor.floors, stands, self._cell))
+            if known is not None:
+                await self._begin_as_before(*known)
         except FlightdError as err:
             _LOG.warning("what the station before knew of its fleet is not used: %s", err)
+        except Exception:  # noqa: BLE001 - the fleet begins when all stand on the ground
+            _LOG.error("what the station before knew of its fleet is not used", exc_info=True)
+
+    async def _begin_as_before(self, floor: KeptFloor, fleet: KeptFleet) -> None:
+        """Nobody leaves the ground for what that station was asked for, unless the site starts without a
+        person; who is in the air flies on to it."""
+        if {*fleet.drones} != {*self._drones} or {*floor.floors} != {*self._drones}:
+            _LOG.warning("the fleet had other drones before: it flies once all told where they stand")
             return
-        self._compared = dict(floor.floors)
+        stands = {name: standing.node for name, standing in floor.standings.items()}
+        made = await self._aside(partial(FleetFloor, floor.floors, stands, self._cell))
         drones = self._drones_on(made)
         for name, drone in drones.items():
             drone.recall(fleet.drones[name])
+            drone.may_start = floor.floors[name].unattended_start
+        self._compared, self._queue = dict(floor.floors), WorkQueue.of(fleet.work)
         await self._begin(made, drones, pace_of(floor.standings.values()))
 
     def _drones_on(self, floor: FleetFloor) -> dict[str, FleetDrone]:
@@ -235,6 +247,8 @@ class OwnFleet(VehicleSides):
             raise InputError(f"no drone of the fleet is called {drone}")
         if self._traffic is None:
             raise UnavailableError(f"the fleet does not fly: {self._trouble}")
+        for each in self._fleet[1].values() if self._fleet is not None else ():
+            each.may_start = True
         self._traffic.ask(nodes, drone)
 
     def document(self) -> dict[str, Any]:

@@ -157,7 +157,10 @@ class StationTraffic:
 
     async def _keep_what(self, decided: _Decided) -> None:
         """Before it is ordered."""
-        kept = {name: drone.kept(decided.base.get(name, ())) for name, drone in self._drones.items()}
+        kept = {
+            name: drone.kept(decided.base.get(name, ()), paused=name in decided.paused)
+            for name, drone in self._drones.items()
+        }
         await self._keep(kept, self._queue)
 
     def _see(self, name: str, drone: FleetDrone) -> _Seen:

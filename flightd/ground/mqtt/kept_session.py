@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from flightd.adapters.ground_link.messages.published import StatusReport
-from flightd.core.types import CommandKind, Phase
+from flightd.core.types import Phase
 from flightd.ground.mqtt.safe_return import Standing
 from flightd.mission.machine import FLYING
 
@@ -28,15 +29,13 @@ class StationBefore:
 
     def __init__(self) -> None:
         self.kept = KeptSession()
-        self._ordered: frozenset[str] = frozenset()
+        self._ordered: Counter[str] = Counter()
         self.flies_on = False
         """The drone flies what that station ordered, to its end: nobody here knows that order."""
 
-    def recall(self, kept: KeptSession, ordered: Collection[str]) -> None:
-        """It is known before the drone is heard; it was ordered over these nodes at last."""
-        self.kept = kept
-        sent = {f"{CommandKind.GOTO} {node}" for node in ordered}
-        self._ordered = frozenset({*sent, CommandKind.PLAN.value, CommandKind.START.value})
+    def recall(self, kept: KeptSession, ordered: Iterable[str]) -> None:
+        """It is known before the drone is heard; these commands may have been given last, each once."""
+        self.kept, self._ordered = kept, Counter(ordered)
 
     def greet(self, session: str) -> KeptSession | None:
         """The drone is heard, in this session: what holds in it."""
@@ -44,16 +43,20 @@ class StationBefore:
         if kept.session == session:
             self.flies_on = True
             return kept
-        self._ordered, self.flies_on = frozenset(), False
+        self._ordered.clear()
+        self.flies_on = False
         return None
 
     def gave(self, command: str) -> bool:
         """Whether that station may have given a command that the drone tells of, with what it did since."""
-        return command in self._ordered
+        if self._ordered[command] <= 0:
+            return False
+        self._ordered[command] -= 1
+        return True
 
     def is_past(self) -> None:
         """The drone told what it did meanwhile."""
-        self._ordered = frozenset()
+        self._ordered.clear()
 
     def see(self, status: StatusReport) -> None:
         """Until it holds, or is on the ground."""

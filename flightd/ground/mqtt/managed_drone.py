@@ -11,7 +11,7 @@ import asyncio
 import logging
 import uuid
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Final
@@ -61,6 +61,8 @@ _MOST_WAITING: Final = 32
 _MOST_WORDS: Final = 300
 _MOST_PLANS: Final = 16
 _COMMANDS: Final = frozenset(CommandKind)
+_OURS: Final = "vda5050-"
+"""Before the id of what a manager's vehicle side asks of a drone."""
 
 WriteDown = Callable[[str, str, str, str], None]
 """What the manager did, to which drone, and what came of it: act, drone, outcome, why."""
@@ -146,11 +148,12 @@ class ManagedDrone:
             return replace(self._before.kept, taken=self._taken)
         return KeptSession(session, tuple(self._plans), self._standing, seq, self._taken)
 
-    def recall(self, kept: KeptSession, ordered: Collection[str]) -> None:
+    def recall(self, kept: KeptSession, ordered: Iterable[str]) -> None:
         """Go on with what the station before knew, before anything is heard: it flies by that one's plans,
-        and was ordered over these nodes at last.  If it has another session by then nothing of this holds
-        but that a person has it."""
-        self.taken_by_person(kept.taken)
+        and may have been given these commands at last.  If it has another session by then nothing of this
+        holds but that a person has it."""
+        if kept.taken:
+            self.taken_by_person()
         self._before.recall(kept, ordered)
 
     # what comes in
@@ -284,6 +287,10 @@ class ManagedDrone:
         arrived = self._arrived(status)
         asked = [self._asked.popleft() for _ in range(len(self._asked))]
         stands_on = None if self._standing is None else self._standing.node
+        if self._before.flies_on and status.plan.startswith(_OURS) and status.plan not in self._plans:
+            self._plans.append(
+                status.plan
+            )  # handed over after the station before wrote down for the last time
         mode = OperatingMode.MANUAL if self._is_new else self._mode(status)
         self._is_new = False
         last, floor = self.vehicle.last_node, self._welcome["floor"]
@@ -415,7 +422,7 @@ class ManagedDrone:
         self._asked.extend(await self._counts.results(over, link))
 
     async def _do(self, act: PlanNext | CommandNext, status: StatusReport, link: DroneLink) -> None:
-        act_id = f"vda5050-{uuid.uuid4().hex}"
+        act_id = f"{_OURS}{uuid.uuid4().hex}"
         if isinstance(act, PlanNext):
             text, levels = "plan", levels_of(self._order, act.nodes)
             self._plans.append(act_id)

@@ -18,7 +18,8 @@ _RESTS = {Phase.DONE, Phase.PREFLIGHT}
 
 
 async def until_done(fleet: PaperFleet, nodes: str) -> None:
-    """All these nodes; who was seen to be done with its flight is made ready for the next one."""
+    """All these nodes; who was seen to be done with its flight is made ready for the next one, and what is
+    left once nobody flies is asked for again."""
     wanted = set(nodes.split())
     for _ in range(400):
         await asyncio.sleep(1.0)
@@ -27,6 +28,8 @@ async def until_done(fleet: PaperFleet, nodes: str) -> None:
         for name, drone in fleet.drones.items():
             if drone.phase is Phase.DONE and not fleet.flown(name):
                 drone.begin_anew()
+        if fleet.state["open"] and all(drone.phase is Phase.PREFLIGHT for drone in fleet.drones.values()):
+            fleet.own.ask(fleet.state["open"])
     pytest.fail(f"done are {fleet.state['done']}")
 
 
@@ -134,6 +137,87 @@ def test_who_is_silent_when_the_next_station_begins_has_his_air_to_himself(tmp_p
         b.heard = True
         b.welcome()
         await until_done(fleet, "B2 B3")
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
+@pytest.mark.parametrize("orderly", [False, True])
+def test_who_was_halted_by_the_station_is_no_persons(tmp_path: Path, orderly: bool) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        await on_way_to("B3", fleet)
+        if orderly:
+            await fleet.own.leave()
+        else:
+            fleet.drones["c"].sees = False  # b is paused before air in which c may be
+            await asyncio.sleep(0.1)
+        await fleet.kill()
+        fleet.drones["c"].sees = True
+        fleet.start_again()
+        await until(lambda: fleet.state["flies"])
+        await asyncio.sleep(2.0)
+        assert fleet.state["drones"]["b"]["why"] != "a person has it"
+        await until(lambda: b.phase is Phase.DONE, 200)
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
+def test_a_station_that_dies_before_it_hears_anybody_leaves_what_is_known(
+    tmp_path: Path,
+) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        await on_way_to("B3", fleet)
+        await fleet.kill()
+        for drone in fleet.drones.values():
+            drone.heard = False
+        for _ in range(3):
+            fleet.start()
+            await asyncio.sleep(1.0)
+            await fleet.kill()
+        for drone in fleet.drones.values():
+            drone.heard = True
+        fleet.start_again()
+        await until(lambda: fleet.state["flies"])
+        await until(lambda: fleet.flown("b"), 60)
+        await until_done(fleet, "B3")
+        assert "home" not in b.commands
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
+def test_nobody_leaves_the_ground_for_what_a_station_before_was_asked_for(tmp_path: Path) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        for drone in fleet.drones.values():
+            drone.never_starts = True
+        fleet.own.ask(["A3"])
+        await asyncio.sleep(5.0)
+        await fleet.kill()
+        for drone in fleet.drones.values():
+            drone.never_starts = False
+        fleet.start_again()
+        await asyncio.sleep(30.0)
+        assert fleet.state["open"] == ["A3"]
+        assert {drone.phase for drone in fleet.drones.values()} == {Phase.PREFLIGHT}
+        fleet.own.ask(["B3"])
+        await until_done(fleet, "A3 B3")
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
+def test_nobody_is_flown_on_while_one_is_not_heard_that_may_be_anywhere(tmp_path: Path) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: a.phase is Phase.FOLLOW and a.way[0] == "A3", 100)
+        b.heard = False  # it rests on its pad, for all that is known
+        await fleet.kill()
+        fleet.start_again()
+        await until(lambda: a.phase is Phase.HOLD, 60)
+        await asyncio.sleep(60.0)
+        assert (a.phase, fleet.flown("a")) == (Phase.HOLD, False)
+        b.heard = True
+        await until_done(fleet, "A3")
 
     fly(go, memory=FleetMemory(tmp_path))
 
