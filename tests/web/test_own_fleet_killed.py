@@ -86,7 +86,7 @@ def test_a_station_that_is_killed_twice_has_its_tours_flown_to_their_end(tmp_pat
             await told("flies", True)
             await station.ask({"nodes": ["B3"], "drone": "b"})
             await station.ask({"nodes": ["A3"], "drone": "a"})
-            await until(lambda: Phase.FOLLOW in {a.phase, b.phase}, 60)
+            await until(lambda: min(a.at_m[2], b.at_m[2]) > 1.0, 60)
             for _ in range(2):
                 await station.kill()
                 await station.start()
