@@ -105,7 +105,8 @@ class _Layer:
 
     def box(self, x: int, y: int, w: int, h: int, evidence: float) -> CodeRegion:
         """Samples as pixels of the picture."""
-        return CodeRegion(*(side * self.pixel for side in (x, y, x + w, y + h)), evidence)
+        px = self.pixel
+        return CodeRegion(x * px, y * px, (x + w) * px, (y + h) * px, evidence)
 
     def margin(self, long: int) -> float:
         """Pixels in which a code that shows over so many samples may go on."""

@@ -126,7 +126,7 @@ def test_a_code_of_any_size_is_read_in_a_large_picture(kind: str, scale: int) ->
     text = "9780679601050" if kind == "EAN13" else "BOX-4711"
     code = cv2.GaussianBlur(label(text, kind, scale), (0, 0), 0.8)
     room = 300, max(300, 1200 - code.shape[1])
-    large = np.pad(code, (room, room), constant_values=120)
+    large = np.asarray(np.pad(code, (room, room), constant_values=120), np.uint8)
     large[::50] = 90  # edges all over, but no code
     large[300 : 300 + code.shape[0], 300 : 300 + code.shape[1]] = code
     assert texts(large) == [text]
