@@ -1,8 +1,9 @@
 """How well it is told how full places are: rendered places against the truth of the simulator.
 
 `python -m tools.bench_fill --sites 6` prints the share of places within 10 points, of those unknown, and the
-worst, and how many empty places were told as such.  `--aside 0.3` takes the pictures of each view from places
-so far apart along the aisle, and decides as in passing; `--pictures 8` so many, at most, of each.
+worst, how far it is off how goods stand out and lean, and how many empty places were told as such.
+`--aside 0.3` takes the pictures of each view from places so far apart along the aisle, and decides as in
+passing; `--pictures 8` so many, at most, of each.
 """
 
 from __future__ import annotations
@@ -41,8 +42,8 @@ _EXPOSURES = (0.7, 0.85, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """One place: what was told of it, its true share and overhang; `state` is None where it is looked at
-    again."""
+    """One place: what was told of it, its true share, overhang and lean; `state` is None where it is
+    looked at again."""
 
     code: str
     seed: int
@@ -59,6 +60,15 @@ class Told:
     @property
     def share(self) -> float | None:
         return None if self.fill is None else self.fill.share
+
+    @property
+    def lean_m(self) -> float | None:
+        return None if self.fill is None else self.fill.lean_m
+
+    @property
+    def true_lean_m(self) -> float:
+        goods = self.place.goods
+        return max((abs(stack.lean_m) for stack in goods.stacks), default=0.0) if goods is not None else 0.0
 
     @property
     def overhang_m(self) -> float:
@@ -177,6 +187,12 @@ def table(told: Sequence[Told]) -> list[str]:
     out = [one for one in told if one.fill is not None and one.fill.overhang_m is not None]
     outs = sorted(abs((one.fill.overhang_m or 0.0) - one.overhang_m) for one in out if one.fill is not None)
     standing = [one for one in plain if one.overhang_m > 0.0]
+    filled_plain = [one for one in plain if one.place.goods is not None]
+    leans = [(abs(one.lean_m - one.true_lean_m), one) for one in told if one.lean_m is not None]
+    leans.sort(key=lambda pair: -pair[0])
+    leaning = [one for one in filled_plain if one.true_lean_m > 0.0]
+    as_leaning = sum(one.lean_m is not None for one in leaning)
+    offs = sorted(error for error, _ in leans)
     empty = [one for one in told if one.place.goods is None]
     as_such = sum(one.state is LocationState.EMPTY for one in empty)
     again = sum(one.state is None for one in empty)
@@ -190,7 +206,14 @@ def table(told: Sequence[Told]) -> list[str]:
         f"filled though the state is empty {len(filled)}, empty though it is not {len(emptied)}",
         f"overhang told {len(out)} of {len(standing)}, off by {_cm(outs[len(outs) // 2 :])} in the middle, "
         f"by {_cm(outs[-1:])} at most",
+        f"lean told {len(leans)} of {len(filled_plain)}, of those that lean {as_leaning} of {len(leaning)}, "
+        f"off by {_cm(offs[len(offs) // 2 :])} in the middle, {_cm(offs[19 * len(offs) // 20 :])} in 95 %, "
+        f"{_cm(offs[-1:])} at most",
     ]
+    for error, one in leans[:3]:
+        lines.append(
+            f"lean off by {_cm([error])}: {one.code}, seed {one.seed}, true {_cm([one.true_lean_m])}"
+        )
     for error, one in off[:5]:
         lines.append(f"off by {error:.2f}: {one.code}, seed {one.seed}, {_words(one)}")
     return lines

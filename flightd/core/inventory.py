@@ -64,16 +64,20 @@ class CountPose:
 class PlaceFill:
     """How full a place is: the `share` of its opening, 0..1 as seen straight from before it, in which goods
     stand; None where the pictures do not tell.  `overhang_m` is how far goods are seen to stand out over the
-    rack's face, None where none are."""
+    rack's face, None where none are.  `lean_m` is how far the top of the goods that are seen to lean most is
+    aside of their foot, None where that is not known."""
 
     share: float | None
     overhang_m: float | None = None
+    lean_m: float | None = None
 
     def __post_init__(self) -> None:
         if self.share is not None and not 0.0 <= self.share <= 1.0:
             raise ValueError(f"a share of {self.share} outside 0..1")
         if self.overhang_m is not None and not 0.0 < self.overhang_m < math.inf:
             raise ValueError(f"an overhang of {self.overhang_m} m")
+        if self.lean_m is not None and not 0.0 <= self.lean_m < math.inf:
+            raise ValueError(f"goods that lean by {self.lean_m} m")
 
 
 @dataclass(frozen=True, slots=True)

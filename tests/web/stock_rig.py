@@ -69,7 +69,7 @@ def counted_store(folder: Path) -> None:
         kept = store.keep_evidence(picture_of(f"00{SSCC}"))
         store.commit(look("AL-01-1-1", LocationState.UNREADABLE, run="2026-W46", at_s=-604_800))
         store.commit(look("AL-01-1-1", LocationState.READ, code(f"00{SSCC}", ("00", SSCC)), evidence=kept))
-        filled = PlaceFill(0.625, 0.04)
+        filled = PlaceFill(0.625, 0.04, 0.03)
         store.commit(look("AL-01-2-1", LocationState.READ, code("4006381333931"), fill=filled))
         store.commit(look("AL-02-1-1", LocationState.EMPTY))
         store.commit(look("AL-02-2-1", LocationState.UNREADABLE, fill=PlaceFill(None)))

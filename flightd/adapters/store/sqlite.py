@@ -26,7 +26,7 @@ from flightd.adapters.store.label_texts import (
     merge_texts,
     was_searched,
 )
-from flightd.adapters.store.place_fills import FILL_TABLES, keep_fill, kept_fills
+from flightd.adapters.store.place_fills import FILL_TABLES, LEAN_COLUMN, keep_fill, kept_fills
 from flightd.adapters.store.read_only import connect_read_only
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
@@ -41,17 +41,20 @@ from flightd.core.inventory import (
 from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
-_VERSION = 4
+_VERSION = 5
 _WITH_TEXTS = 3
 """The first format with module sizes and printed text."""
-_READABLE = (2, 3, _VERSION)
-"""Formats that are read as they are: nothing but that and how full places are is missing."""
+_WITH_FILLS = 4
+"""The first that says how full places are."""
+_READABLE = (2, 3, 4, _VERSION)
+"""Formats that are read as they are: nothing but that, and how much goods lean, is missing."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
 _TAKEN_OVER = {
     1: ("ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1",),
     2: ("ALTER TABLE code_read ADD COLUMN module_px REAL", *TEXT_TABLES),
     3: FILL_TABLES,
+    4: LEAN_COLUMN,
 }
 """What makes a file of each earlier format one of the next."""
 _SCHEMA = """
@@ -83,7 +86,7 @@ CREATE TABLE code_read (
     module_px REAL,
     PRIMARY KEY (observation, number)
 ) STRICT, WITHOUT ROWID;
-""" + "".join(f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES))
+""" + "".join(f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES, *LEAN_COLUMN))
 
 
 class SqliteStore:
@@ -346,7 +349,8 @@ class SqliteStore:
             )
             reads.setdefault(seen, []).append(read)
         texts = kept_texts(self._db) if self._version >= _WITH_TEXTS else {}
-        fills = kept_fills(self._db) if self._version == _VERSION else {}
+        with_fills = self._version >= _WITH_FILLS
+        fills = kept_fills(self._db, with_lean=self._version == _VERSION) if with_fills else {}
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
             "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "

@@ -16,3 +16,9 @@ def fill_text(fill: PlaceFill | None) -> str | None:
 def fill_of(text: str | None) -> PlaceFill | None:
     """The same back."""
     return None if text is None else PlaceFill(**json.loads(text))
+
+
+def fill_shown(text: str | None) -> dict[str, float | None] | None:
+    """The same for people and programs; what was not told then is null."""
+    fill = fill_of(text)
+    return None if fill is None else fill_json(fill)

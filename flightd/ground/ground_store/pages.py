@@ -9,6 +9,7 @@ from typing import Any
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
 from flightd.ground.ground_store.engine import Row, Session
+from flightd.ground.ground_store.fill_text import fill_shown
 
 MOST_ROWS = 1000
 _STOCK = (
@@ -86,7 +87,7 @@ def stock(
         site, *values, after, limit,
     )  # fmt: skip
     names = ("location", "node", "state", "texts", "utc_ns", "run", "confidence", "evidence", "fill")
-    return [_document(names, row) for row in rows]
+    return [{**_document(names, row), "fill": fill_shown(row[-1])} for row in rows]
 
 
 def differences(session: Session, run: int, after: str, limit: int) -> list[dict[str, Any]]:
@@ -170,7 +171,7 @@ def _only(found: list[Row], otherwise: str) -> int:
 def _document(names: tuple[str, ...], row: Row) -> dict[str, Any]:
     document = {}
     for name, value in zip(names, row, strict=True):
-        shown = json.loads(value) if value is not None and name.endswith(("texts", "fill")) else value
+        shown = json.loads(value) if name.endswith("texts") else value
         document[name] = value.hex() if isinstance(value, bytes) else shown
     return document
 
@@ -190,7 +191,7 @@ def _look(row: Row) -> dict[str, Any]:
         if node is None
         else {"node": node, "x_m": x_m, "y_m": y_m, "height_m": height_m, "yaw_rad": yaw_rad},
         "evidence": None if evidence is None else evidence.hex(),
-        "fill": None if fill is None else json.loads(fill),
+        "fill": fill_shown(fill),
         "reads": [
             {"symbology": s, "text": text, "checksum": bool(sure), "agreeing": n, "quality": q, "gs1": gs1}
             for s, text, sure, n, q, gs1 in json.loads(reads)

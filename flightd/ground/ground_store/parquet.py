@@ -32,7 +32,7 @@ TABLES = {
         "utc": "TIMESTAMP_NS", "id": "VARCHAR", "site": "VARCHAR", "run": "VARCHAR", "location": "VARCHAR",
         "state": "VARCHAR", "confidence": "DOUBLE", "standing": "TINYINT", "node": "VARCHAR", "x_m": "DOUBLE",
         "y_m": "DOUBLE", "height_m": "DOUBLE", "yaw_rad": "DOUBLE", "evidence": "VARCHAR", "reads": "VARCHAR",
-        "fill_asked": "BOOLEAN", "fill": "DOUBLE", "overhang_m": "DOUBLE",
+        "fill_asked": "BOOLEAN", "fill": "DOUBLE", "overhang_m": "DOUBLE", "lean_m": "DOUBLE",
     },
     "differences": {
         "utc": "TIMESTAMP_NS", "observation": "VARCHAR", "site": "VARCHAR", "run": "VARCHAR",
@@ -96,8 +96,8 @@ def _with_fill(row: Row) -> Row:
     *look, fill = row
     told = fill_of(fill)
     if told is None:
-        return (*look, False, None, None)
-    return (*look, True, told.share, told.overhang_m)
+        return (*look, False, None, None, None)
+    return (*look, True, told.share, told.overhang_m, told.lean_m)
 
 
 def _write_csv(file: Path, rows: Iterator[Row]) -> int:

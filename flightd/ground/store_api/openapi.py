@@ -20,10 +20,11 @@ _KINDS: dict[str, dict[str, Any]] = {
     "fill": {
         "type": "object",
         "description": "How full the place is, 0 to 1; null in it is unknown.",
-        "required": ["share", "overhang_m"],
+        "required": ["share", "overhang_m", "lean_m"],
         "properties": {
             "share": {"type": ["number", "null"], "minimum": 0, "maximum": 1},
             "overhang_m": {"type": ["number", "null"], "exclusiveMinimum": 0},
+            "lean_m": {"type": ["number", "null"], "minimum": 0},
         },
     },
     "change": {"type": "string", "enum": [change.value for change in CountChange]},

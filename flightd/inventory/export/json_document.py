@@ -59,7 +59,7 @@ def observation_json(seen: Observation, least_confidence: float = LEAST_CONFIDEN
 
 def fill_json(fill: PlaceFill) -> dict[str, float | None]:
     """How full a place is; null for what the pictures do not tell."""
-    return {"share": fill.share, "overhang_m": fill.overhang_m}
+    return {"share": fill.share, "overhang_m": fill.overhang_m, "lean_m": fill.lean_m}
 
 
 def _value_json(stands: PlaceValue) -> dict[str, object]:

@@ -14,7 +14,7 @@ from flightd.inventory.place_values import code_values, place_values
 
 COLUMNS: Final = (
     "location", "state", "text", "symbology", "gs1", "confidence", "utc", "run", "node", "x_m", "y_m",
-    "height_m", "evidence", *VALUE_COLUMNS, "fill", "overhang_m",
+    "height_m", "evidence", *VALUE_COLUMNS, "fill", "overhang_m", "lean_m",
 )  # fmt: skip
 
 
@@ -49,8 +49,14 @@ def rows_of(
 
 
 def _fill_cells(seen: Observation | None) -> list[str | float]:
-    """How full the place is, 0 to 1, and the overhang; empty where it was not asked."""
+    """How full the place is, 0 to 1, the overhang, and how much goods lean; empty where it was not asked, and
+    nothing leans where nothing stands."""
     if seen is None or seen.fill is None:
-        return ["", ""]
-    share, overhang_m = seen.fill.share, seen.fill.overhang_m
-    return [UNKNOWN if share is None else share, "" if overhang_m is None else overhang_m]
+        return ["", "", ""]
+    share, overhang_m, lean_m = seen.fill.share, seen.fill.overhang_m, seen.fill.lean_m
+    unknown = "" if share == 0.0 else UNKNOWN
+    return [
+        UNKNOWN if share is None else share,
+        "" if overhang_m is None else overhang_m,
+        unknown if lean_m is None else lean_m,
+    ]

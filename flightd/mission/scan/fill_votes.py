@@ -12,8 +12,9 @@ from typing import Final
 from flightd.core.inventory import LocationState, PlaceFill
 
 _SAME: Final = 0.1
+_SAME_LEAN_M: Final = 0.01
 _LEAST_AGREEING: Final = 0.7
-"""Part of the pictures whose shares must be so near to that in the middle."""
+"""Part of the pictures whose shares, or leans, must be so near to that in the middle."""
 _LEAST_KNOWN: Final = 0.6
 """Part of the pictures that must tell a share."""
 _NOTHING: Final = 0.03
@@ -55,4 +56,13 @@ class FillVotes:
             return PlaceFill(None)
         overhangs = [fill.overhang_m for fill in self._fills if fill.overhang_m is not None]
         overhang_m = round(median(overhangs), 3) if len(overhangs) > _LEAST_KNOWN * len(shares) else None
-        return PlaceFill(round(share, 3), overhang_m)
+        return PlaceFill(round(share, 3), overhang_m, self._lean_m(len(shares)))
+
+    def _lean_m(self, telling: int) -> float | None:
+        """How much the goods lean, of so many pictures that tell a share."""
+        leans = [fill.lean_m for fill in self._fills if fill.lean_m is not None]
+        if len(leans) < _LEAST_KNOWN * telling:
+            return None
+        lean_m = median(leans)
+        agreeing = sum(abs(other - lean_m) <= _SAME_LEAN_M for other in leans)
+        return round(lean_m, 3) if agreeing >= _LEAST_AGREEING * len(leans) else None

@@ -109,9 +109,12 @@ def fill_text(fill: PlaceFill | None) -> str:
     if fill.share is None:
         return "unknown"
     out = f", {100.0 * fill.overhang_m:.0f} cm over the rack's face" if fill.overhang_m else ""
-    return f"{100.0 * fill.share:.0f} %{out}"
+    aside = f", leans by {100.0 * fill.lean_m:.0f} cm" if fill.lean_m and fill.lean_m >= _LEANS_M else ""
+    return f"{100.0 * fill.share:.0f} %{out}{aside}"
 
 
+_LEANS_M = 0.02
+"""Goods that lean less are not said to lean: it is measured to about a centimetre."""
 _ROUNDING = 1e-9
 """0.29 * 1000 is a little less than 290."""
 

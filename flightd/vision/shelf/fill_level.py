@@ -19,8 +19,16 @@ from flightd.core.scanning import PlaceOpening
 from flightd.core.types import Image
 from flightd.vision.shelf.deck_sight import deck_sight
 from flightd.vision.shelf.front_depth import FrontDepths
+from flightd.vision.shelf.front_lean import front_lean_m
 from flightd.vision.shelf.goods_front import CLEAR_M, LOW_M, SIDE_DEPTH_M, equal_runs, fronts_m
-from flightd.vision.shelf.opening_raster import BELOW_M, COLUMN_M, ROW_M, deck_strip_m, opening_raster
+from flightd.vision.shelf.opening_raster import (
+    BELOW_M,
+    COLUMN_M,
+    ROW_M,
+    deck_strip_m,
+    in_columns,
+    opening_raster,
+)
 
 Floats: TypeAlias = NDArray[np.float32]
 Box: TypeAlias = tuple[float, float, float, float]
@@ -67,6 +75,10 @@ _GOODS_COLUMNS: Final = 4
 """A front that is lower, or narrower, may be the deck itself or a stripe of light: goods are larger."""
 
 
+_LEANS_M: Final = 0.02
+"""A front that leans so much surely does."""
+
+
 @dataclass(frozen=True, slots=True)
 class OpeningLook:
     """What one picture tells of an opening: how full it is, and whether it `is_clear`: its front is seen from
@@ -84,18 +96,18 @@ def fill_level(
 ) -> OpeningLook:
     """How full a place is, from one picture, (H, W, 3) BGR, of that white level; `codes_m` are the codes in
     it."""
-    raster = opening_raster(picture, opening) if white > 0.0 else None
-    if raster is None:
+    square = opening_raster(picture, opening) if white > 0.0 else None
+    if square is None:
         return UNKNOWN
     is_burnt = white >= _BURNT
-    look = measure(raster, opening, white * _BURNT_MORE if is_burnt else white, codes_m, is_burnt=is_burnt)
+    look = measure(square, opening, white * _BURNT_MORE if is_burnt else white, codes_m, is_burnt=is_burnt)
     is_whole = all(abs(x) <= picture.shape[1] / 2 for x, _ in opening.front_px)
     is_known = not is_burnt and opening.height_m >= _LEAST_ROOM_M
     return OpeningLook(look.fill if is_known else PlaceFill(None), look.is_clear and is_whole)
 
 
 def measure(
-    raster: Image,
+    square: Image,
     opening: PlaceOpening,
     white: float,
     codes_m: Sequence[Box] = (),
@@ -104,6 +116,7 @@ def measure(
 ) -> OpeningLook:
     """The same from the opening's raster, which is all in the picture.  Where the white is a guess, as
     `is_burnt` says, an opening is clear only if its deck is seen all over."""
+    raster = in_columns(square)
     left, right = (round(_POST_M / COLUMN_M) if post else 0 for post in opening.posts)
     if raster.shape[1] - left - right < _LEAST_COLUMNS:
         return UNKNOWN
@@ -126,6 +139,7 @@ def measure(
     _, eye_m, before_m = opening.eye_m
     colours = np.maximum(raster[deck + round(CLEAR_M / ROW_M) :, columns], 1).astype(np.float32) / white
     area, doubt, out_m = 0.0, 0.0, 0.0
+    leans_m: list[float | None] = []
     runs = equal_runs(tops_m)
     for number, (start, stop) in enumerate(runs):
         if tops_m[start] < LOW_M:
@@ -139,12 +153,25 @@ def measure(
         scale = (before_m + depth_m) / before_m
         high_m = min(eye_m + (top_m - eye_m) * scale, opening.height_m)
         area += width * COLUMN_M * scale * max(high_m, 0.0)
+        ends_m = (start + left) * COLUMN_M, (stop + left) * COLUMN_M
+        foot_m = max(deck_strip_m(opening, depth_m), 0.0)
+        if top_m >= _GOODS_M and stop - start >= _GOODS_COLUMNS:
+            lean_m = front_lean_m(square, white, ends_m, (foot_m, top_m + depths.edge_m))
+            leans_m.append(None if lean_m is None else abs(lean_m) * scale)
         doubt += width * COLUMN_M * perhaps_m
     whole_m2 = opening.width_m * opening.height_m
     if doubt > _DOUBT_PART * whole_m2:
         return OpeningLook(PlaceFill(None), is_clear)
     share = min(area / whole_m2, 1.0)
-    return OpeningLook(PlaceFill(round(share, 3), round(out_m, 3) or None), is_clear)
+    return OpeningLook(PlaceFill(round(share, 3), round(out_m, 3) or None, _most_m(leans_m)), is_clear)
+
+
+def _most_m(leans_m: Sequence[float | None]) -> float | None:
+    """How much the front leans that leans most; None where none is known to lean and one may."""
+    known = [lean_m for lean_m in leans_m if lean_m is not None]
+    if not known or (len(known) < len(leans_m) and max(known) < _LEANS_M):
+        return None
+    return round(max(known), 3)
 
 
 def _without_top(colours: Floats, top_m: float, opening: PlaceOpening) -> tuple[float, float]:

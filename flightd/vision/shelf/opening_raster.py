@@ -34,16 +34,21 @@ def onto_opening(points_px: Matrix, opening: PlaceOpening) -> Matrix:
     return np.asarray(cv2.perspectiveTransform(points_px[None].astype(np.float64), onto)[0], np.float64)
 
 
+def in_columns(square: Image) -> Image:
+    """(rows, columns, 3) BGR of an opening's raster with `COLUMN_M` to a column."""
+    size = round(square.shape[1] * ROW_M / COLUMN_M), square.shape[0]
+    return np.asarray(cv2.resize(square, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
 def opening_raster(picture: Image, opening: PlaceOpening) -> Image | None:
-    """(rows, columns, 3) BGR of an opening in a picture, (H, W, 3) BGR: `ROW_M` by `COLUMN_M` to the pixel,
-    the lowest row first, `BELOW_M` below the deck; None for an opening of no usual size."""
+    """(rows, columns, 3) BGR of an opening in a picture, (H, W, 3) BGR: square pixels of `ROW_M`, the lowest
+    row first, `BELOW_M` below the deck; None for an opening of no usual size."""
     width_m, height_m = opening.width_m, opening.height_m
     if not (COLUMN_M < width_m <= _MOST_M and ROW_M < height_m <= _MOST_M):
         return None
-    columns, rows = round(width_m / COLUMN_M), round((height_m + BELOW_M) / ROW_M)
-    fine = round(width_m / ROW_M)
+    columns, rows = round(width_m / ROW_M), round((height_m + BELOW_M) / ROW_M)
     deck_row = BELOW_M / ROW_M - 0.5
-    right, top = fine - 0.5, rows - 0.5
+    right, top = columns - 0.5, rows - 0.5
     edges = np.array([(-0.5, top), (right, top), (right, deck_row), (-0.5, deck_row)], np.float32)
     centre = np.array(picture.shape[1::-1]) / 2 - 0.5
     corners = (np.array(opening.front_px) + centre).astype(np.float32)
@@ -54,5 +59,5 @@ def opening_raster(picture: Image, opening: PlaceOpening) -> Image | None:
     cut = picture[low[1] : high[1], low[0] : high[0]]
     onto = cv2.getPerspectiveTransform(edges, corners - low.astype(np.float32))
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    square = cv2.warpPerspective(cut, onto, (fine, rows), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(cv2.resize(square, (columns, rows), interpolation=cv2.INTER_AREA), np.uint8)
+    square = cv2.warpPerspective(cut, onto, (columns, rows), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(square, np.uint8)

@@ -23,28 +23,34 @@ def record(fill: PlaceFill | None) -> LocationRecord:
     return LocationRecord("A-1", "A1", seen)
 
 
-def exported(fill: PlaceFill | None) -> tuple[str, str, Any]:
+def exported(fill: PlaceFill | None) -> tuple[str, str, str, Any]:
     """The cells of the table, and the part of the JSON document."""
     (row,) = csv.DictReader(io.StringIO(as_csv([record(fill)]).decode()))
     (place,) = json.loads(as_json([record(fill)]))["locations"]
-    return row["fill"], row["overhang_m"], place["observation"]["fill"]
+    return row["fill"], row["overhang_m"], row["lean_m"], place["observation"]["fill"]
 
 
 @pytest.mark.parametrize(
     ("fill", "told"),
     [
-        (PlaceFill(0.625, 0.04), ("0.625", "0.04", {"share": 0.625, "overhang_m": 0.04})),
-        (PlaceFill(0.0), ("0.0", "", {"share": 0.0, "overhang_m": None})),
-        (PlaceFill(None), ("unknown", "", {"share": None, "overhang_m": None})),
-        (None, ("", "", None)),
+        (
+            PlaceFill(0.625, 0.04, 0.03),
+            ("0.625", "0.04", "0.03", {"share": 0.625, "overhang_m": 0.04, "lean_m": 0.03}),
+        ),
+        (PlaceFill(0.5), ("0.5", "", "unknown", {"share": 0.5, "overhang_m": None, "lean_m": None})),
+        (PlaceFill(0.0), ("0.0", "", "", {"share": 0.0, "overhang_m": None, "lean_m": None})),
+        (PlaceFill(None), ("unknown", "", "unknown", {"share": None, "overhang_m": None, "lean_m": None})),
+        (None, ("", "", "", None)),
     ],
 )
-def test_exports_say_how_full_a_place_is(fill: PlaceFill | None, told: tuple[str, str, Any]) -> None:
+def test_exports_say_how_full_a_place_is(fill: PlaceFill | None, told: tuple[str, str, str, Any]) -> None:
     assert exported(fill) == told
 
 
 def test_the_report_says_it_for_people() -> None:
     assert fill_text(PlaceFill(0.625, 0.04)) == "62 %, 4 cm over the rack's face"
+    assert fill_text(PlaceFill(0.625, lean_m=0.034)) == "62 %, leans by 3 cm"
+    assert fill_text(PlaceFill(0.625, lean_m=0.01)) == "62 %"
     assert (fill_text(PlaceFill(None)), fill_text(None)) == ("unknown", "")
     assert "62 % filled" in cell(record(PlaceFill(0.625)), "")
     assert "filled" not in cell(record(PlaceFill(None)), "")

@@ -40,6 +40,27 @@ def test_a_location_of_which_no_picture_shows_the_opening_is_not_asked() -> None
     assert votes.together(EMPTY) is None
 
 
+@pytest.mark.parametrize(
+    ("leans_m", "told_m"),
+    [
+        ((0.03, 0.034, 0.04), 0.034),
+        ((0.03, 0.034, None), 0.032),
+        ((0.03, None, None), None),
+        ((0.0, 0.03, 0.05), None),
+        ((0.0, 0.004, 0.0), 0.0),
+    ],
+)
+def test_a_lean_is_told_where_most_pictures_tell_the_same(
+    leans_m: tuple[float | None, ...], told_m: float | None
+) -> None:
+    votes = FillVotes()
+    for lean_m in leans_m:
+        votes.add(PlaceFill(0.5, lean_m=lean_m))
+    told = votes.together(READ)
+    assert told is not None
+    assert told.lean_m == told_m
+
+
 def test_goods_are_seen_where_most_pictures_that_tell_a_share_show_some() -> None:
     votes = FillVotes()
     assert not votes.sees_goods

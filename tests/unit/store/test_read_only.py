@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import LocationState, Observation, PlannedLocation, Standing
+from flightd.core.inventory import LocationState, Observation, PlaceFill, PlannedLocation, Standing
 
 EMPTY = Observation("monday", "A-1", 5, LocationState.EMPTY, 0.9)
 
@@ -68,19 +69,22 @@ def test_a_log_without_its_index_is_left_to_a_writer(tmp_path: Path) -> None:
         assert "inventory.db-shm" not in files(tmp_path)
 
 
-@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("version", [2, 3, 4])
 def test_a_store_of_a_format_before_is_read_as_it_is(tmp_path: Path, version: int) -> None:
+    seen = replace(EMPTY, fill=PlaceFill(0.0)) if version == 4 else EMPTY
     with SqliteStore(tmp_path) as writer:
-        writer.commit(EMPTY)
+        writer.commit(seen)
     with sqlite3.connect(tmp_path / "inventory.db") as older:
-        older.execute("DROP TABLE place_fill")
+        older.execute("ALTER TABLE place_fill DROP COLUMN lean_m")
+        if version < 4:
+            older.execute("DROP TABLE place_fill")
         if version == 2:
             older.execute("ALTER TABLE code_read DROP COLUMN module_px")
             older.execute("DROP TABLE text_search")
         older.execute(f"PRAGMA user_version = {version}")
     older.close()
     with SqliteStore(tmp_path, read_only=True) as store:
-        assert [record.observation for record in store.locations()] == [EMPTY]
+        assert [record.observation for record in store.locations()] == [seen]
 
 
 def test_what_is_no_store_of_today_is_refused_and_not_made_one(tmp_path: Path) -> None:
@@ -97,7 +101,7 @@ def test_what_is_no_store_of_today_is_refused_and_not_made_one(tmp_path: Path) -
     with sqlite3.connect(file) as changed:
         changed.execute("PRAGMA user_version = 1")
     changed.close()
-    with pytest.raises(InputError, match="format 1, known here is 4; open it once with flightd inventory"):
+    with pytest.raises(InputError, match="format 1, known here is 5; open it once with flightd inventory"):
         SqliteStore(tmp_path, read_only=True)
     with sqlite3.connect(file) as changed:
         changed.execute("PRAGMA application_id = 7")

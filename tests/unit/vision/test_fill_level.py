@@ -73,6 +73,12 @@ class Shelf:
         front = [(left, 0, depth), (right, 0, depth), (right, high, depth), (left, high, depth)]
         self.area(front, colour, grained=True)
 
+    def leaning(self, box: Box, lean_m: float) -> None:
+        """A front whose top is so far to the right of its foot, before the dark."""
+        left, right, high, depth = box
+        top = [(right + lean_m, high, depth), (left + lean_m, high, depth)]
+        self.area([(left, 0, depth), (right, 0, depth), *top], FRONT, grained=True)
+
     def opening(self) -> PlaceOpening:
         half_m = WIDTH_M / 2
         corners = project([(-half_m, HEIGHT_M, 0), (half_m, HEIGHT_M, 0), (half_m, 0, 0), (-half_m, 0, 0)])
@@ -135,6 +141,24 @@ def test_goods_that_stand_out_are_told_in_their_true_size_with_how_far() -> None
     share, overhang_m = told(out)
     assert share == pytest.approx(share_of(out), abs=0.05)
     assert overhang_m == pytest.approx(0.1, abs=0.02)
+
+
+@pytest.mark.parametrize("lean_m", [-0.05, -0.03, 0.0, 0.04])
+@pytest.mark.parametrize("depth_m", [0.0, 0.15])
+def test_how_far_a_top_is_aside_of_its_foot_is_told_to_a_centimetre(lean_m: float, depth_m: float) -> None:
+    shelf = Shelf()
+    shelf.leaning((-0.2, 0.12, 0.4, depth_m), lean_m)
+    assert seen(shelf).fill.lean_m == pytest.approx(abs(lean_m), abs=0.01)
+
+
+def test_a_front_whose_edges_do_not_tell_leans_by_nobody_knows_what() -> None:
+    shelf = Shelf()
+    wider_above = [(-0.2, 0.0, 0.0), (0.1, 0.0, 0.0), (0.14, 0.4, 0.0), (-0.2, 0.4, 0.0)]
+    shelf.area(wider_above, FRONT, grained=True)
+    assert seen(shelf).fill.lean_m is None
+    low = Shelf()
+    low.leaning((-0.2, 0.1, 0.1, 0.0), 0.04)
+    assert seen(low).fill.lean_m is None
 
 
 def test_an_empty_place_has_no_share_of_goods() -> None:

@@ -91,6 +91,7 @@ export default {
   "Filled": "Gefüllt",
   "unknown": "unbekannt",
   "Overhang": "Überstand",
+  "Leans by": "Neigt sich um",
   "Confidence": "Sicherheit",
   "Looked at": "Angesehen",
   "Run": "Lauf",

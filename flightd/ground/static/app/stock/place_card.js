@@ -125,6 +125,7 @@ function Facts({ look }) {
   const facts = [
     [say("Filled"), fill && (fill.share === null ? say("unknown") : `${decimal(100 * fill.share)} %`)],
     [say("Overhang"), fill?.overhang_m && `${decimal(fill.overhang_m, 2)} m`],
+    [say("Leans by"), fill?.share > 0 && (fill.lean_m === null ? say("unknown") : `${decimal(fill.lean_m, 2)} m`)],
     [say("Confidence"), `${Math.floor(look.confidence * 100)} %`],
     [say("Looked at"), when(look.utc)],
     [say("Run"), look.run],
