@@ -21,6 +21,19 @@ class TrackedLine:
     from_m: float = 0.0
     to_m: float = 0.0
 
+    def moved(self, across_m: float, along_m: float) -> TrackedLine:
+        """The line as the drone sees it after moving so far across it and along it."""
+        return TrackedLine(
+            self.id,
+            self.offset_m - across_m,
+            self.sigma_m,
+            self.width_m,
+            self.seen_ns,
+            self.hits,
+            self.from_m - along_m,
+            self.to_m - along_m,
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class FloorJunction:
@@ -31,6 +44,10 @@ class FloorJunction:
     dy_m: float
     arms: int
 
+    def moved(self, x_m: float, y_m: float) -> FloorJunction:
+        """The junction as the drone sees it after moving so far along the axes."""
+        return FloorJunction(self.dx_m - x_m, self.dy_m - y_m, self.arms)
+
 
 @dataclass(frozen=True, slots=True)
 class PadOffset:
@@ -39,6 +56,10 @@ class PadOffset:
     x_m: float
     y_m: float
     side_m: float
+
+    def moved(self, x_m: float, y_m: float) -> PadOffset:
+        """The pad as the drone sees it after moving so far along the axes."""
+        return PadOffset(self.x_m - x_m, self.y_m - y_m, self.side_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +70,10 @@ class MarkerOffset:
     x_m: float
     y_m: float
     side_m: float
+
+    def moved(self, x_m: float, y_m: float) -> MarkerOffset:
+        """The marker as the drone sees it after moving so far along the axes."""
+        return MarkerOffset(self.id, self.x_m - x_m, self.y_m - y_m, self.side_m)
 
 
 @dataclass(frozen=True, slots=True)

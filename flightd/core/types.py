@@ -218,6 +218,10 @@ class Attitude:
     yaw_rad: float
     yaw_rate_radps: float = math.nan
 
+    def turned_to(self, yaw_rad: float) -> Attitude:
+        """The same with another heading."""
+        return Attitude(self.stamp_ns, self.roll_rad, self.pitch_rad, yaw_rad, self.yaw_rate_radps)
+
 
 class LandedState(enum.StrEnum):
     UNKNOWN = "unknown"

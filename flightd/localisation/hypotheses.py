@@ -104,9 +104,10 @@ class Places:
             share = np.where(index >= 0, told, 0.0)
             weight += share
             total += share * (lines[index] - track.offset_m)
-        there = weight > 0.0
-        self.at_m[there, axis] = total[there] / weight[there]
-        self.sigma_m[there, axis] = weight[there] ** -0.5
+        there = (weight > 0.0).nonzero()[0]
+        weight = weight[there]
+        self.at_m[there, axis] = total[there] / weight
+        self.sigma_m[there, axis] = weight**-0.5
 
     # Evidence
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 from flightd.core.types import OVER, WAITING, CommandKind, Phase
 from flightd.mission.safety.hazard_table import ACTIONS, PHASE_OF, Action, triggers_of
@@ -20,6 +21,8 @@ from flightd.mission.triggers import Trigger
 
 class Intent(enum.Enum):
     """What a phase is for, and so what follows when it is over."""
+
+    __hash__ = object.__hash__  # as for a trigger
 
     WAIT = "wait for the order to start"
     VISIT = "fly the plan, and land on its pad"
@@ -42,6 +45,7 @@ _ON_WAY = (Intent.VISIT, Intent.RETURN, Intent.HOME)
 _BACK = (Intent.RETURN, Intent.HOME)
 _ADOPTED = (Intent.ADOPTED, Intent.ADOPTED_STOP)
 """Of a vehicle found flying at a restart."""
+_STOPPED = (Intent.STOP, Intent.ADOPTED_STOP)
 
 _INTENTS: Mapping[Phase, tuple[Intent, ...]] = {
     Phase.PREFLIGHT: (Intent.WAIT, Intent.VISIT),
@@ -98,7 +102,7 @@ class State:
     @property
     def stopped(self) -> bool:
         """Neither steers nor brakes nor waits."""
-        return self.intent in {Intent.STOP, Intent.ADOPTED_STOP}
+        return self.intent in _STOPPED
 
     @property
     def adopted(self) -> bool:
@@ -315,11 +319,13 @@ def next_state(state: State, triggers: Collection[Trigger]) -> tuple[State, Trig
     return state, None
 
 
+@cache
 def taken_in(state: State) -> frozenset[Trigger]:
     """The triggers that mean anything in a state."""
     return frozenset(trigger for trigger, outcome in TABLE[state].items() if outcome is not None)
 
 
+@cache
 def possible_commands(state: State) -> frozenset[CommandKind]:
     """What an operator may order now; everything else has no effect and is refused."""
     return frozenset(kind for kind, trigger in COMMANDS.items() if TABLE[state][trigger] is not None)

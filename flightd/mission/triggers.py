@@ -8,6 +8,8 @@ import enum
 class Trigger(enum.Enum):
     """Tried in this order: what keeps people safe stands first, and the cause before its consequence."""
 
+    __hash__ = object.__hash__  # enum's own asks Python for the name's, a hundred times in each tick
+
     PILOT_TOOK = "the pilot took control"
     STOP = "stop ordered"
     DOWN_TO_SWAP = "down on the pad for a fresh battery"

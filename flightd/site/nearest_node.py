@@ -15,7 +15,8 @@ class NodeIndex:
 
     def __init__(self, site: Site) -> None:
         self._nodes = tuple(site.nodes.values())
-        self._at_m = np.array([(node.x_m, node.y_m) for node in self._nodes])
+        self._x_m = np.array([node.x_m for node in self._nodes])
+        self._y_m = np.array([node.y_m for node in self._nodes])
         self._half_m = {
             node: 0.5 * min((site.distance_m(node, other) for other in site.neighbours(node)), default=1.0)
             for node in site.nodes
@@ -23,12 +24,12 @@ class NodeIndex:
 
     def node(self, x_m: float, y_m: float) -> Node:
         """The node closest to a point; ties go to the first in the map."""
-        apart = np.square(self._at_m - (x_m, y_m)).sum(axis=1)
+        apart = np.square(self._x_m - x_m) + np.square(self._y_m - y_m)
         return self._nodes[int(apart.argmin())]
 
     def nearest(self, x_m: float, y_m: float, most: int) -> list[tuple[Node, float]]:
         """Up to `most` nodes by their distance from a point."""
-        apart: Matrix = np.hypot(*(self._at_m - (x_m, y_m)).T)
+        apart: Matrix = np.hypot(self._x_m - x_m, self._y_m - y_m)
         return [(self._nodes[i], float(apart[i])) for i in np.argsort(apart, kind="stable")[:most]]
 
     def inside(self, node: str, sigma_x_m: float, sigma_y_m: float) -> float:

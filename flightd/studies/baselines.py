@@ -61,7 +61,7 @@ def skimage_skeleton(bgr: Image) -> Lines:
         from skimage.morphology import skeletonize
     except ImportError as err:
         raise missing_extra("bench", "scikit-image's skeleton") from err
-    thin = skeletonize(_region_grown(bgr) > 0).astype(np.uint8) * 255  # type: ignore[no-untyped-call]
+    thin = skeletonize(_region_grown(bgr) > 0).astype(np.uint8) * 255
     return _average(_hough(thin, min(bgr.shape[:2]) // 6), bgr.shape[1] * _CLUSTER_PX)
 
 

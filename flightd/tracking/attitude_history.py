@@ -71,14 +71,14 @@ class AttitudeHistory:
 
     def at(self, stamp_ns: int) -> Attitude | None:
         """Attitude at `stamp_ns`, or None where no sample is near enough to tell."""
-        if not self._samples or stamp_ns < self._stamps[0]:
+        samples, stamps = self._samples, self._stamps
+        if not stamps or stamp_ns < stamps[0]:
             return None
-        last = self._samples[-1]
-        if stamp_ns >= last.stamp_ns:
-            return last if stamp_ns - last.stamp_ns <= self._hold_ns else None
-        index = bisect_right(self._stamps, stamp_ns)
-        a, b = self._samples[index - 1], self._samples[index]
-        w = (stamp_ns - a.stamp_ns) / (b.stamp_ns - a.stamp_ns)
+        if stamp_ns >= (last_ns := stamps[-1]):
+            return samples[-1] if stamp_ns - last_ns <= self._hold_ns else None
+        index = bisect_right(stamps, stamp_ns)
+        a, b, a_ns = samples[index - 1], samples[index], stamps[index - 1]
+        w = (stamp_ns - a_ns) / (stamps[index] - a_ns)
         return Attitude(
             stamp_ns,
             a.roll_rad + w * (b.roll_rad - a.roll_rad),

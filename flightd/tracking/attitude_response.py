@@ -18,6 +18,7 @@ from flightd.core.geometry import Matrix, wrap_pi
 from flightd.core.types import Attitude, AttitudeSetpoint
 
 _DELAYS_S: Matrix = np.arange(0.0, 0.305, 0.01)
+_DELAYS_NS: Matrix = _DELAYS_S * 1e9
 _BANDWIDTHS_RADPS: Matrix = np.array([6.0, 8.0, 10.0, 13.0, 17.0])
 """Of an attitude loop without overshoot."""
 _FIRST_DELAY_S, _DELAY_SIGMA_S = 0.04, 0.04
@@ -43,6 +44,10 @@ _SHARED_S = 0.02
 """Most that the delay believed moves at once."""
 
 
+_TILT, _ALL = slice(2), slice(3)
+"""Of the axes of an answer, which are roll, pitch and yaw."""
+
+
 class _Kept:
     """The answers of the last seconds, for each model."""
 
@@ -63,14 +68,15 @@ class _Kept:
         self._times[self._count], self._answers[self._count] = now_ns, answer
         self._count += 1
 
-    def at(self, times_ns: Matrix) -> Matrix:
-        """(N, models, 3) the undelayed answers at (N,) times; beyond what is kept its first and last."""
-        times, answers = self._times[: self._count], self._answers[: self._count]
-        after = np.searchsorted(times, times_ns)
+    def at(self, times_ns: Matrix, axes: slice) -> Matrix:
+        """(N, models, axes) the undelayed answers at (N,) times; beyond what is kept its first and last."""
+        times, answers = self._times[: self._count], self._answers[: self._count, :, axes]
+        after = times.searchsorted(times_ns)
         np.maximum(
             np.minimum(after, self._count - 1, out=after), 1, out=after
         )  # np.clip takes five times as long
-        before, old_ns = answers[after - 1], times[after - 1]
+        earlier = after - 1
+        before, old_ns = answers[earlier], times[earlier]
         share = (times_ns - old_ns) / (times[after] - old_ns)
         np.maximum(np.minimum(share, 1.0, out=share), 0.0, out=share)
         between: Matrix = before + share[:, None, None] * (answers[after] - before)
@@ -122,7 +128,7 @@ class AttitudeResponse:
             self._settled_s = 0.0
             return
         dt_s = (sample.stamp_ns - last.stamp_ns) * 1e-9
-        reaches_back = sample.stamp_ns - self._kept.oldest_ns > _DELAYS_S[-1] * 1e9
+        reaches_back = sample.stamp_ns - self._kept.oldest_ns > _DELAYS_NS[-1]
         if 0.0 < dt_s < _STEADY_S and reaches_back:
             self._learn(sample, dt_s)
 
@@ -137,7 +143,7 @@ class AttitudeResponse:
         if steps <= 0 or told.stamp_ns < self._kept.oldest_ns:
             return []
         after_ns = np.linspace(0.0, ahead_ns, steps + 1)
-        answers = self._kept.at(told.stamp_ns + after_ns - self.delay_s * 1e9)[:, self._model]
+        answers = self._kept.at(told.stamp_ns + after_ns - self.delay_s * 1e9, _ALL)[:, self._model]
         gained = answers - answers[0]
         return [
             Attitude(
@@ -155,10 +161,10 @@ class AttitudeResponse:
         """Answer the setpoint for a while: critically damped, exactly."""
         w = _BANDWIDTHS_RADPS[:, None]
         wanted = np.array([setpoint.roll_rad, setpoint.pitch_rad])
-        off, speed = self._answer[:, :2] - wanted, self._speed[:, :2]
+        off, speed = self._answer[:, _TILT] - wanted, self._speed[:, _TILT]
         fade, push = np.exp(-w * dt_s), speed + w * off
-        self._answer[:, :2] = wanted + (off + push * dt_s) * fade
-        self._speed[:, :2] = (speed - w * push * dt_s) * fade
+        self._answer[:, _TILT] = wanted + (off + push * dt_s) * fade
+        self._speed[:, _TILT] = (speed - w * push * dt_s) * fade
         turn = self._speed[:, 2] + (setpoint.yaw_rate_radps - self._speed[:, 2]) * (
             1.0 - math.exp(-dt_s / _YAW_LAG_S)
         )
@@ -166,16 +172,16 @@ class AttitudeResponse:
         self._speed[:, 2] = turn
 
     def _learn(self, sample: Attitude, dt_s: float) -> None:
-        answers = self._kept.at(sample.stamp_ns - _DELAYS_S * 1e9)[:, :, :2]
+        answers = self._kept.at(sample.stamp_ns - _DELAYS_NS, _TILT)
         errors = np.array([sample.roll_rad, sample.pitch_rad]) - answers
         self._settled_s += dt_s
         self._steady += min(dt_s / min(_STEADY_S, self._settled_s), 1.0) * (errors - self._steady)
-        speed_radps = float(np.abs(self._speed[self._model, :2]).max())
+        speed_radps = max(map(abs, self._speed[self._model, _TILT].tolist()))
         told_s = dt_s * min((speed_radps / _MOVED_RADPS) ** 2, 1.0)
         if not told_s or self._settled_s < 0.5:
             return
         self._seen_s = min(self._seen_s + told_s, _MEMORY_S)
-        squares = (errors - self._steady) ** 2
+        squares = np.square(errors - self._steady)
         off = (squares[..., 0] + squares[..., 1]) / 2.0
         self._square += min(told_s / self._seen_s, 1.0) * (off - self._square)
         self._believe()
@@ -185,7 +191,8 @@ class AttitudeResponse:
         cost = self._prior + 0.5 * self._seen_s * _INDEPENDENT_PER_S * self._square / least
         odds = np.exp(cost.min() - cost)
         self._model = int(odds.sum(axis=0).argmax())
-        odds = odds[:, self._model] / odds[:, self._model].sum()
+        odds = odds[:, self._model]
+        odds = odds / odds.sum()
         mean_s = float(odds @ _DELAYS_S)
-        self.delay_sigma_s = math.sqrt(float(odds @ (_DELAYS_S - mean_s) ** 2))
+        self.delay_sigma_s = math.sqrt(float(odds @ np.square(_DELAYS_S - mean_s)))
         self.delay_s += min(max(mean_s - self.delay_s, -_SHARED_S), _SHARED_S)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import replace
+from operator import itemgetter
 
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Attitude
@@ -19,6 +19,7 @@ _LIVELY = 5
 _ASTRAY_RAD, _ASTRAY_NS = math.radians(6.0), 500_000_000
 """No steel turns a told heading by so much against the gyros within this time."""
 _SHOWN_NS = 1_500_000_000
+_APART_RAD = itemgetter(1)
 
 
 class CarriedHeading:
@@ -56,7 +57,7 @@ class CarriedHeading:
             return sample
         dt_s = (sample.stamp_ns - last.stamp_ns) * 1e-9
         if not dt_s > 0.0:
-            return replace(sample, yaw_rad=self._heading_rad)
+            return sample.turned_to(self._heading_rad)
         self._last = sample
         told_rad, felt_rad = wrap_pi(sample.yaw_rad - last.yaw_rad), self._felt_rad(last, sample, dt_s)
         apart_rad = wrap_pi(told_rad - felt_rad)
@@ -64,7 +65,7 @@ class CarriedHeading:
         # what leaps in one sample is not followed anyhow: no bias matters in that time
         by_gyros = not math.isnan(felt_rad) and (watched or abs(apart_rad) > LEAP_RAD)
         self._heading_rad = wrap_pi(self._heading_rad + (felt_rad if by_gyros else told_rad))
-        return replace(sample, yaw_rad=self._heading_rad)
+        return sample.turned_to(self._heading_rad)
 
     def distrust(self) -> None:
         """The gyros are wrong: from now on the heading is the told one."""
@@ -80,7 +81,7 @@ class CarriedHeading:
         self._apart.append((stamp_ns, apart_rad))
         while self._apart[0][0] < stamp_ns - _ASTRAY_NS:
             self._apart.popleft()
-        turned_rad = sum(apart for _, apart in self._apart)
+        turned_rad = sum(map(_APART_RAD, self._apart))
         if abs(turned_rad) > _ASTRAY_RAD:
             self._apart.clear()
             whole_rad = self.leap_rad + turned_rad

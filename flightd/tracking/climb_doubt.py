@@ -71,13 +71,16 @@ def _most_off_m(new: _Sample, samples: Iterable[_Sample]) -> float:
     """How far both heights say that the told climb is off, at most since any of these; 0 where they do not
     agree on that."""
     most_m = 0.0
+    _, new_range_m, new_width_m, new_climbed_m = new
     for old in samples:
-        climbed_m = new.climbed_m - old.climbed_m
-        by_range_m = (new.range_m - old.range_m) - climbed_m
-        by_width_m = (new.width_m - old.width_m) - climbed_m
-        off_m = min(abs(by_range_m), abs(by_width_m))
-        if off_m > most_m and by_range_m * by_width_m > 0.0 and _agree(new, old):
-            most_m = off_m
+        _, range_m, width_m, climbed_m = old
+        told_m = new_climbed_m - climbed_m
+        by_range_m = (new_range_m - range_m) - told_m
+        if abs(by_range_m) <= most_m:  # of dozens at each frame hardly one is more
+            continue
+        by_width_m = (new_width_m - width_m) - told_m
+        if abs(by_width_m) > most_m and by_range_m * by_width_m > 0.0 and _agree(new, old):
+            most_m = min(abs(by_range_m), abs(by_width_m))
     return most_m
 
 

@@ -60,6 +60,7 @@ _TILTS = [HEIGHT, *range(ROLL, DELAY), SCALE]
 """All of the sensors but the delay."""
 _BUT_MOTION = [PSI, PSI_RATE, *range(LEAK, FIRST_LINE)]
 """All but velocities, disturbances, the error of the attitude and the lines."""
+_DIAGONAL = np.diag_indices(FIRST_LINE)
 _MOST_HEIGHT_SHARE = 0.05
 _MOST_LEAK_PER_S = 1.0
 _MOST_SIGMAS = 4.0
@@ -108,10 +109,10 @@ class FloorFilter:
     # What is known
 
     def mean(self, index: int) -> float:
-        return float(self._x[index])
+        return self._x.item(index)
 
     def sigma(self, index: int) -> float:
-        return math.sqrt(max(float(self._p[index, index]), 0.0))
+        return math.sqrt(max(self._p.item(index, index), 0.0))
 
     def without_errors(self) -> Matrix:
         """The first states, were the told attitude right."""
@@ -224,7 +225,7 @@ class FloorFilter:
         for axis, push in enumerate(PUSH):
             changed = self._innovations.one_sided(axis)
             self._drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
-        noise_q[np.diag_indices(FIRST_LINE)] += self._drift**2 * dt_s
+        noise_q[_DIAGONAL] += self._drift**2 * dt_s
         self._p = predicted(self._p, step.jacobian, noise_q)
         self._fade(dt_s)
 
@@ -423,7 +424,7 @@ class FloorFilter:
         noise = np.diag(measured.variances) + by_tilt @ by_tilt.T * shake_rad**2
         expected = np.einsum("ij,jk,ik->i", rows, self._p, rows) + np.diag(noise)
         outlying = np.maximum(np.abs(errors) / np.sqrt(expected) / _OUTLIER_SIGMAS, 1.0)
-        noise[np.diag_indices(len(noise))] += (outlying - 1.0) * expected
+        noise += np.diag((outlying - 1.0) * expected)
         self._x, self._p, spread = corrected(self._x, self._p, rows, errors, noise, unmoved)
         delay_s = _MOST_SIGMAS * self._priors.delay_s
         self._bound_push()
@@ -444,7 +445,7 @@ class FloorFilter:
             mine = [-float(error) for error, of in zip(told, axes, strict=True) if of == axis]
             if mine:
                 self._innovations.take(axis, sum(mine) / len(mine))
-        self._innovations.shaken(float(np.mean(told**2)))
+        self._innovations.shaken(float(np.add.reduce(told**2)) / len(told))
 
     def _add(self, sight: LineSight, rates: Rates, stamp_ns: int, before: Matrix) -> None:
         """A line where it was seen, as wrong as everything by which it was placed; moved by what the frame

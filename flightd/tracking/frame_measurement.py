@@ -47,8 +47,8 @@ class FrameMeasurement:
         row = np.zeros(len(x))
         by_roll, by_pitch = sight.turn_per_tilt
         row[PSI] = 1.0
-        row[[ROLL, PITCH]] = by_roll, by_pitch
-        row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.turn_per_mount
+        row[ROLL], row[PITCH] = by_roll, by_pitch
+        row[MOUNT_ROLL], row[MOUNT_PITCH] = sight.turn_per_mount
         row[MOUNT_YAW] = 1.0
         row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
         self._add(row, sight.turn_rad, sight.sigma_theta_rad, sight.turn_per_tilt, None)
@@ -77,8 +77,8 @@ def placed(sight: LineSight, x: Matrix, rates: Rates) -> Matrix:
     """d(seen offset) / d state: (n,)."""
     row = np.zeros(len(x))
     (by_roll, by_pitch), by_yaw = sight.offset_per_tilt, sight.offset_per_yaw
-    row[[ROLL, PITCH]] = by_roll, by_pitch
-    row[[MOUNT_ROLL, MOUNT_PITCH]] = sight.offset_per_mount
+    row[ROLL], row[PITCH] = by_roll, by_pitch
+    row[MOUNT_ROLL], row[MOUNT_PITCH] = sight.offset_per_mount
     row[MOUNT_YAW] = sight.offset_per_mount_yaw
     row[PSI] = by_yaw
     turning = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + by_yaw * rates.yaw_radps

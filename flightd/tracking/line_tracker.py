@@ -167,9 +167,7 @@ class LineTracker:
     def assume(self, samples: Iterable[Attitude]) -> None:
         """Take what is assumed of the attitude from the newest sample on, in the place of what was."""
         lead_rad = self._carried_heading.lead_rad
-        self._history.assume(
-            replace(sample, yaw_rad=wrap_pi(sample.yaw_rad + lead_rad)) for sample in samples
-        )
+        self._history.assume(sample.turned_to(wrap_pi(sample.yaw_rad + lead_rad)) for sample in samples)
 
     def measured(self, lines: LineSet) -> bool:
         """Whether the attitude at the frame's exposure has been told."""
@@ -292,20 +290,16 @@ class LineTracker:
             vy,
             ax,
             ay,
-            tuple(_moved(line, moved_x, moved_y) for line in self._lines(0) if self._stamp_ns > known_ns),
-            tuple(_moved(line, moved_y, moved_x) for line in self._lines(1) if self._stamp_ns > known_ns),
-            tuple(replace(pad, x_m=pad.x_m - moved_x, y_m=pad.y_m - moved_y) for pad in self._pads),
+            tuple(line.moved(moved_x, moved_y) for line in self._lines(0) if self._stamp_ns > known_ns),
+            tuple(line.moved(moved_y, moved_x) for line in self._lines(1) if self._stamp_ns > known_ns),
+            tuple(pad.moved(moved_x, moved_y) for pad in self._pads),
             self._stamp_ns,
-            tuple(
-                replace(seen, dx_m=seen.dx_m - moved_x, dy_m=seen.dy_m - moved_y) for seen in self._junctions
-            ),
+            tuple(seen.moved(moved_x, moved_y) for seen in self._junctions),
             self._stamp_ns,
             sensors=held.sensors() if self._lines_ns else NOT_SEEN,
             push_x_mps2=held.push_after(0, (now_ns - self._stamp_ns) * 1e-9),
             push_y_mps2=held.push_after(1, (now_ns - self._stamp_ns) * 1e-9),
-            markers=tuple(
-                replace(mark, x_m=mark.x_m - moved_x, y_m=mark.y_m - moved_y) for mark in self._markers
-            ),
+            markers=tuple(mark.moved(moved_x, moved_y) for mark in self._markers),
             features_ns=(self._features_ns[0], self._features_ns[1]),
         )
 
@@ -432,18 +426,17 @@ class LineTracker:
     def _corrected(self, told: Attitude) -> Attitude:
         """The attitude, by what has been learnt of it."""
         held = self._filter
-        return replace(
-            told, roll_rad=told.roll_rad + held.mean(ROLL), pitch_rad=told.pitch_rad + held.mean(PITCH)
-        )
+        roll, pitch = told.roll_rad + held.mean(ROLL), told.pitch_rad + held.mean(PITCH)
+        return Attitude(told.stamp_ns, roll, pitch, told.yaw_rad, told.yaw_rate_radps)
 
     def _corrected_mount(self) -> Mount:
         """The camera's mount, by what has been learnt of it."""
         held, mount = self._filter, self._mount
-        return replace(
-            mount,
-            roll_rad=mount.roll_rad + held.mean(MOUNT_ROLL),
-            pitch_rad=mount.pitch_rad + held.mean(MOUNT_PITCH),
-            yaw_rad=mount.yaw_rad + held.mean(MOUNT_YAW),
+        return Mount(
+            mount.yaw_rad + held.mean(MOUNT_YAW),
+            mount.offset_m,
+            mount.roll_rad + held.mean(MOUNT_ROLL),
+            mount.pitch_rad + held.mean(MOUNT_PITCH),
         )
 
     def _rates(self, stamp_ns: int) -> Rates:
@@ -480,13 +473,3 @@ class LineTracker:
             held.turn_mount_by(self._dispute.error_rad)
         elif turned is Turned.HEADING:
             held.turn_to(held.mean(PSI) + self._dispute.error_rad, self._params.start_yaw_sigma_rad)
-
-
-def _moved(line: TrackedLine, across_m: float, along_m: float) -> TrackedLine:
-    """The line as the drone sees it after moving so far across it and along it."""
-    return replace(
-        line,
-        offset_m=line.offset_m - across_m,
-        from_m=line.from_m - along_m,
-        to_m=line.to_m - along_m,
-    )

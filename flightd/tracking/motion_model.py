@@ -31,6 +31,7 @@ HEIGHT_S = 0.5
 """Time within which an error of the told height, that of one averaged over a few samples, fades."""
 VELOCITY, PUSH = (VX, VY), (PUSH_X, PUSH_Y)
 """By grid axis, x and y."""
+_VELOCITIES, _PUSHES = slice(VX, VY + 1), slice(PUSH_X, PUSH_Y + 1)
 
 
 class Told(NamedTuple):
@@ -81,7 +82,8 @@ def _leant(roll_rad: float, pitch_rad: float, cos: float, sin: float) -> tuple[f
 def lean(x: Matrix, told: Told) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
     """Acceleration along the grid axes (m/s2) that the attitude makes at constant height, and what a radian
     more of roll and of pitch would make."""
-    roll, pitch, yaw = told.roll_rad + float(x[ROLL]), told.pitch_rad + float(x[PITCH]), told.yaw_rad + x[PSI]
+    roll, pitch = told.roll_rad + float(x[ROLL]), told.pitch_rad + float(x[PITCH])
+    yaw = told.yaw_rad + float(x[PSI])
     cos, sin = math.cos(yaw), math.sin(yaw)
     per_roll, per_pitch = GRAVITY_MPS2 / math.cos(roll) ** 2, -GRAVITY_MPS2 / math.cos(pitch) ** 2
     return (
@@ -98,7 +100,8 @@ def moved(
     `attitude_s` is the time within which errors of the attitude fade."""
     n, end = len(x), x.copy()
     (ax, ay), by_roll, by_pitch = lean(x, told)
-    accel = np.array([ax + x[PUSH_X] - drag_per_s * x[VX], ay + x[PUSH_Y] - drag_per_s * x[VY]])
+    (vx, vy), (push_x, push_y) = x[_VELOCITIES].tolist(), x[_PUSHES].tolist()
+    accel = np.array([ax + push_x - drag_per_s * vx, ay + push_y - drag_per_s * vy])
     jacobian = np.eye(n)
     jacobian[PSI, PSI_RATE] = dt_s
     for axis, (velocity, push) in enumerate(zip(VELOCITY, PUSH, strict=True)):
@@ -109,7 +112,7 @@ def moved(
     jacobian[VX, PSI], jacobian[VY, PSI] = -ay * dt_s, ax * dt_s
     by_accel = np.zeros((n, 2))
     by_accel[VX, 0] = by_accel[VY, 1] = dt_s
-    way_m = x[[VX, VY]] * dt_s + 0.5 * accel * dt_s * dt_s
+    way_m = (x[_VELOCITIES] * dt_s + 0.5 * accel * dt_s * dt_s).tolist()
     for row, axis in enumerate(axes, FIRST_LINE):
         velocity = VELOCITY[axis]
         jacobian[row] -= 0.5 * dt_s * jacobian[velocity]
@@ -119,7 +122,7 @@ def moved(
     jacobian[HEIGHT, HEIGHT] = math.exp(-dt_s / HEIGHT_S)
     end[HEIGHT] *= jacobian[HEIGHT, HEIGHT]
     end[PSI] += x[PSI_RATE] * dt_s
-    end[[VX, VY]] += accel * dt_s
+    end[_VELOCITIES] += accel * dt_s
     _leak(x, end, jacobian, accel, (ax, ay), told, dt_s, drag_per_s, attitude_s)
     return Step(end, jacobian, by_accel)
 
@@ -142,7 +145,7 @@ def _leak(
     aside = np.array([-math.sin(yaw_rad), math.cos(yaw_rad)]) / GRAVITY_MPS2
     felt = accel - leant
     keep, part = math.exp(-dt_s / attitude_s), float(x[LEAK]) * dt_s
-    cosines = math.cos(told.roll_rad + x[ROLL]), math.cos(told.pitch_rad + x[PITCH])
+    cosines = math.cos(told.roll_rad + float(x[ROLL])), math.cos(told.pitch_rad + float(x[PITCH]))
     for row, by_felt, by_turn, cos in zip(
         (ROLL, PITCH), (aside, -ahead), (-ahead, -aside), cosines, strict=True
     ):
@@ -151,5 +154,5 @@ def _leak(
         jacobian[row, row] = keep + part * (1.0 / cos**2 - 1.0)  # who leans more accelerates more
         jacobian[row, LEAK] = way * dt_s
         jacobian[row, PSI] = part * float(by_turn @ felt)
-        jacobian[row, list(PUSH)] = part * by_felt
-        jacobian[row, list(VELOCITY)] = -drag_per_s * part * by_felt
+        jacobian[row, _PUSHES] = part * by_felt
+        jacobian[row, _VELOCITIES] = -drag_per_s * part * by_felt

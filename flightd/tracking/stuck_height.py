@@ -88,8 +88,11 @@ class StuckHeight:
         unseen_m, first_m = self._unseen_m(), self._first_m
         new_ns, new_m, new_climbed_m, new_wanted_m = new
         stands_still, drop_m, later_m = True, 0.0, new_m
+        wanted = new_wanted_m - self._least_wanted_m > _WANTED_M
         for old_ns, old_m, old_climbed_m, old_wanted_m in reversed(self._samples):
             age_ns = new_ns - old_ns
+            if age_ns > _AHEAD_NS and not wanted:  # older ones could only tell that
+                return False
             rose_m = new_m - old_m
             climbed_m = new_climbed_m - old_climbed_m
             if unseen_m and first_m is not None and abs(old_m - first_m) < _STANDING_M:

@@ -79,16 +79,15 @@ def ground_point(x_px: float, y_px: float, view: FloorView) -> tuple[float, floa
     roll, pitch = view.attitude.roll_rad, view.attitude.pitch_rad
     if abs(roll) > _MAX_TILT_RAD or abs(pitch) > _MAX_TILT_RAD:
         return None
-    lever: Matrix = np.asarray(level_from_body(roll, pitch) @ np.array(view.mount.offset_m), dtype=np.float64)
+    homography, _, lever = _camera(view.lens, view.mount, roll, pitch)
     height_m = view.height_m - float(lever[2])
     centre = view.lens.centre_px
-    homography = ground_homography(view.lens, view.mount, roll, pitch)
-    point = np.linalg.solve(homography, np.array([x_px + centre[0], y_px + centre[1], 1.0]))
-    if point[2] < 0.2 or not height_m > 0.02:  # the horizon, or nearly
+    x, y, depth = np.linalg.solve(homography, np.array([x_px + centre[0], y_px + centre[1], 1.0])).tolist()
+    if depth < 0.2 or not height_m > 0.02:  # the horizon, or nearly
         return None
-    scale = height_m / float(point[2])
-    forward, right = float(point[0]) * scale + float(lever[0]), float(point[1]) * scale + float(lever[1])
-    return forward, right, height_m / view.lens.fx_px / float(point[2]) ** 1.5
+    scale = height_m / depth
+    forward, right = x * scale + float(lever[0]), y * scale + float(lever[1])
+    return forward, right, height_m / view.lens.fx_px / depth**1.5
 
 
 def ground_lines(lines: Sequence[Line], view: FloorView) -> list[GroundLine]:
@@ -118,15 +117,15 @@ def _place(
 ) -> GroundLine | None:
     a, b = math.cos(line.theta_rad), math.sin(line.theta_rad)
     c = -(line.rho_px + a * centre[0] + b * centre[1])
-    on_floor = homography.T @ np.array([a, b, c])  # l' = H.T l on the floor at unit distance
-    forward, right, offset = float(on_floor[0]), float(on_floor[1]), float(on_floor[2])
+    # l' = H.T l on the floor at unit distance
+    forward, right, offset = (homography.T @ np.array([a, b, c])).tolist()
     norm = math.hypot(forward, right)
     middle_px = (line.start_px + line.end_px) / 2
     x, y = line.point_at(middle_px)
-    point = inverse @ np.array([x + centre[0], y + centre[1], 1.0])
-    if norm < 1e-12 or point[2] < 0.2:  # the horizon, or nearly
+    mid_x, mid_y, depth = (inverse @ np.array([x + centre[0], y + centre[1], 1.0])).tolist()
+    if norm < 1e-12 or depth < 0.2:  # the horizon, or nearly
         return None
-    mid_forward, mid_right = float(point[0] / point[2]) * height_m, float(point[1] / point[2]) * height_m
+    mid_forward, mid_right = mid_x / depth * height_m, mid_y / depth * height_m
     # the normal (right, -forward) = (cos, sin) and its offset in metres
     rho, theta = normalise_line(-offset / norm * height_m, math.atan2(-forward, right))
     tan_shift = 0.0
@@ -136,7 +135,7 @@ def _place(
         mid_right -= height_m * tan_roll
         mid_forward += height_m * tan_pitch
     lever_rho = float(lever[1]) * math.cos(theta) - float(lever[0]) * math.sin(theta)
-    metres_per_px = height_m / view.lens.fx_px / float(point[2]) ** 2
+    metres_per_px = height_m / view.lens.fx_px / depth**2
     variance_px = (
         line.sigma_rho_px**2 - 2 * middle_px * line.rho_theta_cov + (middle_px * line.sigma_theta_rad) ** 2
     )
@@ -164,19 +163,19 @@ def heights_by_width(lines: Sequence[Line], view: FloorView, width_m: float) -> 
     _, inverse, lever = _camera(view.lens, view.mount, roll, pitch)
     lever_m = float(lever[2])
     area = 1.0 / (view.lens.fx_px * view.lens.fy_px)
+    centre = view.lens.centre_px
     heights_m = []
     for line in lines:
         x, y = line.point_at((line.start_px + line.end_px) / 2)
-        centre = view.lens.centre_px
-        point = inverse @ np.array([x + centre[0], y + centre[1], 1.0])
-        depth = float(point[2])
+        mid_x, mid_y, depth = (inverse @ np.array([x + centre[0], y + centre[1], 1.0])).tolist()
         if depth < 0.2 or not line.width_px > 0:  # the horizon, or nearly
             continue
-        along = inverse @ np.array([-math.sin(line.theta_rad), math.cos(line.theta_rad), 0.0])
+        direction = np.array([-math.sin(line.theta_rad), math.cos(line.theta_rad), 0.0])
+        to_x, to_y, deeper = (inverse @ direction).tolist()
         # A projective map makes an area 1/depth^3 times as large; what it is stretched along the line, it is
         # not stretched across.
-        stretched = np.hypot(*(along[:2] * depth - point[:2] * along[2])) / depth**2
-        heights_m.append(width_m * float(stretched) * depth**3 / (area * line.width_px) + lever_m)
+        stretched = float(np.hypot(to_x * depth - mid_x * deeper, to_y * depth - mid_y * deeper)) / depth**2
+        heights_m.append(width_m * stretched * depth**3 / (area * line.width_px) + lever_m)
     return heights_m
 
 
@@ -220,10 +219,11 @@ def _on_floor(
     lever: Matrix,
 ) -> list[tuple[float, float]]:
     """(forward, right) of a picture's points below a camera `height_m` up; far away near the horizon."""
-    rows, forward_m, right_m = inverse.tolist(), float(lever[0]), float(lever[1])
+    (xx, xy, x1), (yx, yy, y1), (wx, wy, w1) = inverse.tolist()
+    (centre_x, centre_y), forward_m, right_m = centre, float(lever[0]), float(lever[1])
     points = []
     for x_px, y_px in points_px:
-        x, y, w = (row[0] * (x_px + centre[0]) + row[1] * (y_px + centre[1]) + row[2] for row in rows)
-        scale = height_m / max(w, 0.1)
-        points.append((x * scale + forward_m, y * scale + right_m))
+        x, y = x_px + centre_x, y_px + centre_y
+        scale = height_m / max(wx * x + wy * y + w1, 0.1)
+        points.append(((xx * x + xy * y + x1) * scale + forward_m, (yx * x + yy * y + y1) * scale + right_m))
     return points

@@ -36,7 +36,7 @@ steers it, and it drifts by the square of the time."""
 _JUMPED = 2
 """So many attitudes with a senseless time are no stray datagram."""
 
-_HOLDING = triggers_of(Action.HOLD)
+_HOLDING_BUT_LINES = triggers_of(Action.HOLD) - {Trigger.LINES_LOST}
 _Conditions: TypeAlias = dict[Trigger, tuple[bool, float]]
 """Whether each hazard's condition holds now, and for how long it is tolerated."""
 
@@ -88,17 +88,19 @@ class HazardMonitor:
         """For how long the lines have been lost, glimpses not counted."""
 
     def step(self, s: MissionInputs, situation: FlightContext) -> set[Trigger]:
-        conditions = self._links(s) | self._daemon(s)
+        conditions = self._links(s)
+        conditions |= self._daemon(s)
         found = self._sight(s, situation)
         if s.vehicle is not None:
             found |= self._authority(s, s.vehicle) if situation.airborne else set()
             conditions |= self._vehicle(s, s.vehicle)
-        conditions |= self._pictures(s, situation) | self._place(s)
+        conditions |= self._pictures(s, situation)
+        conditions |= self._place(s)
         for trigger, (present, tolerated_s) in conditions.items():
             holds = present and situation.airborne
             if self._debounce[trigger].step(holds, s.now_ns) >= tolerated_s and holds:
                 found.add(trigger)
-        holding = found & (_HOLDING - {Trigger.LINES_LOST})
+        holding = found & _HOLDING_BUT_LINES
         if self._trouble.step(bool(holding), s.now_ns) > self._params.lines_land_s:
             found.add(Trigger.HAZARD_LASTS)
         return found - {Trigger.LINES_FOUND} if holding else found

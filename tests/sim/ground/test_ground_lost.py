@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +17,16 @@ from flightd.site.site_file import load_site
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[3] / "configs"
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"dwell_s": 0.5})
 SITE = load_site(CONFIGS / "site-demo.toml")
 LOST_S = 5.0
 
 
+@cache
 def flown(action: LossAction, silence: Callable[[int], float]) -> Flown:
     """A short flight in which `silence(ticks since it first followed a line)` gives the link's silence."""
     lost = {"lost_action": action, "lost_s": LOST_S}
-    config = load_config(CONFIGS / "sim.toml").with_values(ground=lost)
-    flight = IdealFlight(SITE, config, visits=("A1", "A2", "A3"))
+    flight = IdealFlight(SITE, CONFIG.with_values(ground=lost), visits=("A1", "A2", "A3"))
     step: Any = flight.pilot.step
     ticks = 0
 
@@ -89,8 +91,7 @@ def test_silence_shorter_than_the_limit_is_nothing() -> None:
 
 def test_who_fell_silent_on_the_ground_keeps_it_there() -> None:
     lost = {"lost_action": LossAction.HOME}
-    config = load_config(CONFIGS / "sim.toml").with_values(ground=lost)
-    flight = IdealFlight(SITE, config, visits=("A1", "A2"))
+    flight = IdealFlight(SITE, CONFIG.with_values(ground=lost), visits=("A1", "A2"))
     flight.ground_silent_s = 60.0
     grounded = flight.fly(10.0)
     assert grounded.phase is Phase.PREFLIGHT
