@@ -74,7 +74,7 @@ class FleetMemory:
     def __init__(self, folder: Path, utc_s: Callable[[], float] = time.time) -> None:
         self._database = OwnDatabase(
             file=folder / FILE,
-            holds="the fleet's flights",
+            holds="the fleet",
             application=_APPLICATION,
             version=_VERSION,
             schema=_SCHEMA,
@@ -110,9 +110,7 @@ class FleetMemory:
         if floor is None or fleet is None:
             return None
         if floor.version != __version__:
-            raise InputError(
-                f"{self._database.file}: another flightd wrote it, {floor.version or 'of before'}"
-            )
+            raise InputError(f"{self._database.file}: flightd {floor.version} wrote it")
         if not 0.0 <= self._utc_s() - fleet.utc_s <= _WORK_LASTS_S:
             over = {*fleet.work.done, *fleet.work.reasons}
             late = {work.node: TOO_OLD for work in fleet.work.work if work.node not in over}
@@ -139,4 +137,4 @@ def _get(kept: sqlite3.Connection, name: str, kind: type[_T]) -> _T | None:
     try:
         return None if row is None else msgspec.json.decode(row[0], type=kind)
     except msgspec.MsgspecError as err:
-        raise sqlite3.DatabaseError(f"what it says of the {name} cannot be read: {err}") from None
+        raise sqlite3.DatabaseError(str(err)) from None

@@ -241,6 +241,8 @@ export default {
   "this station has no folder to keep schedules in": "diese Station hat keinen Ordner für Zeitpläne",
   "a schedule": "ein Zeitplan",
   "the schedules": "die Zeitpläne",
+  "the fleet": "die Flotte",
+  "{file}: flightd {version} wrote it": "{file}: von flightd {version} geschrieben",
   "a schedule in it cannot be read: {why}": "ein Zeitplan darin lässt sich nicht lesen: {why}",
   "{n} schedules are kept already": "{n} Zeitpläne sind schon aufgehoben",
   "there is a schedule {name} already": "einen Zeitplan {name} gibt es schon",
