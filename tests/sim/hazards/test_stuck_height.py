@@ -18,7 +18,7 @@ from tests.sim.ideal.ideal_flight import IdealFlight
 CONFIGS = Path(__file__).parents[3] / "configs"
 CONFIG = load_config(CONFIGS / "sim.toml")
 SITE = load_site(CONFIGS / "site-demo.toml")
-SEEDS = range(1, 1 + int(os.environ.get("FLIGHTD_SEEDS", "2")))
+SEEDS = range(1, 1 + int(os.environ.get("FLIGHTD_SEEDS", "1")))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
