@@ -189,8 +189,9 @@ class OwnFleet(VehicleSides):
         }
 
     async def _keep_in_mind(self, drones: Mapping[str, KeptDrone], queue: WorkQueue) -> None:
-        waits = bool(queue.open or queue.given)
-        await self._write(lambda memory: memory.keep(drones, queue.kept(), waits=waits))
+        # as it is now: more may be asked for while it is written down beside the loop
+        work, waits = queue.kept(), bool(queue.open or queue.given)
+        await self._write(lambda memory: memory.keep(drones, work, waits=waits))
 
     async def _write(self, what: Callable[[FleetMemory], None]) -> None:
         """Flights go on where the disk refuses: what is lost then is lost with the station alone."""

@@ -68,10 +68,6 @@ Keep: TypeAlias = Callable[[Mapping[str, KeptDrone], WorkQueue], Awaitable[None]
 """Writes down how drones and work are, before anything is ordered by it."""
 
 
-async def _keep_nothing(drones: Mapping[str, KeptDrone], queue: WorkQueue) -> None:
-    """Nothing of it outlives the station."""
-
-
 class Aside(Protocol):
     """Does a piece of work that takes a while, beside the loop."""
 
@@ -89,7 +85,7 @@ class StationTraffic:
         pace: Pace,
         cell: CellSize,
         queue: WorkQueue,
-        keep: Keep = _keep_nothing,
+        keep: Keep,
     ) -> None:
         self._keep = keep
         self._floor = floor

@@ -288,9 +288,8 @@ class ManagedDrone:
         asked = [self._asked.popleft() for _ in range(len(self._asked))]
         stands_on = None if self._standing is None else self._standing.node
         if self._before.flies_on and status.plan.startswith(_OURS) and status.plan not in self._plans:
-            self._plans.append(
-                status.plan
-            )  # handed over after the station before wrote down for the last time
+            # handed over after the station before wrote down for the last time
+            self._plans.append(status.plan)
         mode = OperatingMode.MANUAL if self._is_new else self._mode(status)
         self._is_new = False
         last, floor = self.vehicle.last_node, self._welcome["floor"]
