@@ -49,13 +49,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """What a run has collected stays to its end: nobody looks through it for garbage again and again."""
+    """What a run has collected stays to its end: nobody looks through it for garbage again and again, and
+    for what flights leave behind more rarely than a program with little memory would."""
     gc.disable()
     try:
         return (yield)
     finally:
         gc.enable()
         gc.freeze()
+        gc.set_threshold(20_000, 20, 20)
 
 
 @pytest.hookimpl(optionalhook=True)
