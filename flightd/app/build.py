@@ -261,7 +261,7 @@ def pilot_of(
             f" {site.name} ({site.ceiling_m} m)"
         )
     flown = site.between(*flown_between_m(config, site))
-    plan, policy = _plan_on(config, flown, order), HeadingPolicy.of(config)
+    plan, policy = _plan_on(config, flown, order), HeadingPolicy.of(config, flown)
     scanner = scanner_of(config, site)
     check_battery(flown, plan, policy, config, scanner)
     return Pilot(
@@ -370,7 +370,7 @@ def ground_link(
 def _plan_on(config: Config, flown: Site, order: FlightOrder) -> FlightPlan:
     """The plan on a site that has only the keep-outs of the heights flown."""
     visits: Sequence[str] = order.nodes or flown.serpentine_route()
-    start, home, policy = start_of(order, flown), flown.home.node, HeadingPolicy.of(config)
+    start, home, policy = start_of(order, flown), flown.home.node, HeadingPolicy.of(config, flown)
     if order.best_order:
         pace = Pace.of(config.mission)
         visits = ordered_best(flown, visits, (start, home), policy, pace, order.start_yaw_rad)

@@ -52,7 +52,9 @@ class ScanConfig(Section):
     or `expert.brighter`."""
 
     mode: ScanMode = Field(
-        ScanMode.STOP, description="stop: before each place; sweep: in passing, then before what is left"
+        ScanMode.SWEEP,
+        description="sweep: in passing where labels and lines allow, then before what is left; stop: before "
+        "each place",
     )
     min_height_m: float = Field(0.8, ge=0.5, le=20, description="lowest flight along a shelf")
     max_height_m: float | None = Field(

@@ -17,7 +17,7 @@ class ScanMode(enum.StrEnum):
 
 
 class SweepConfig(Section):
-    """How shelves are counted in passing, with `scan.mode = "sweep"`.
+    """How shelves are counted in passing, where `scan.mode` is "sweep".
 
     The speed is the highest that keeps the blur within 0.75 module, gives `views` whole views of each place
     and does not exceed `mission.speed_mps`. An aisle whose labels get less than 2.5 pixels for each module,

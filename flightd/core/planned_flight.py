@@ -79,7 +79,9 @@ class Planner(Protocol):
         """The plan that is flown, or would be with the next start."""
         ...
 
-    def planned(self, nodes: Sequence[str], levels: Sequence[int], *, best_order: bool) -> PlannedFlight:
+    def planned(
+        self, nodes: Sequence[str], levels: Sequence[int], *, best_order: bool, waits: bool = False
+    ) -> PlannedFlight:
         """What a flight over the nodes (none: those of the configuration) would be; changes nothing.
         InputError where it cannot be flown."""
         ...

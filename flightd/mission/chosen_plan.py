@@ -44,9 +44,10 @@ class ChosenPlans:
         best_order: bool = False,
         waits: bool = False,
     ) -> FlightPlan:
-        """The plan over these nodes, each once, home or (`waits`) to hold at the last.  InputError, one line,
-        for a node that the site lacks, that no open line leads to or that a full battery does not reach and
-        come back from, and for levels that nothing is counted on."""
+        """The plan over these nodes, each once, home or (`waits`) to hold at the last, its shelves counted by
+        stopping: who leads it on from node to node has to know its way.  InputError, one line, for a node
+        that the site lacks, that no open line leads to or that a full battery does not reach and come back
+        from, and for levels that nothing is counted on."""
         wanted = tuple(dict.fromkeys(nodes))
         self._check(wanted, levels)
         first = self._first
@@ -58,7 +59,7 @@ class ChosenPlans:
             wanted = tuple(sorted(wanted, key=lambda node: place.get(node, len(place))))
         ends, yaw_rad = (first.start, first.home), first.start_yaw_rad
         plan = make_plan(self._site, wanted, *ends, self._policy, yaw_rad, waits=waits)
-        far = self._sorties(levels).out_of_reach(wanted)
+        far = self._sorties(levels, plan).out_of_reach(wanted)
         if far:
             raise InputError(
                 f"a full battery does not reach {_listed(far)}, last for the stop there and come back with"
@@ -72,7 +73,7 @@ class ChosenPlans:
         """What flying a plan takes, from a battery of that `charge` (0..1) on, `rate_per_s` of a full one
         being used in each second in the air.  Each view of a shelf is looked from once, for its longest."""
         nodes = tuple(stop.node for stop in plan.stops if stop.visit)
-        sorties = self._sorties(levels)
+        sorties = self._sorties(levels, plan)
         way, site = [plan.start, *(stop.node for stop in plan.stops)], self._site
         metres = sum(site.length_m(site.path(a, b)) for a, b in itertools.pairwise(way))
         ways_s = WaysOfPlan.of(site, plan, self._pace)
@@ -87,11 +88,11 @@ class ChosenPlans:
             batteries=flown.batteries,
             charge=charge,
             battery_s=(1.0 - self._battery.reserve) / rate_per_s,
-            sweeps=self._scanner.told_sweeps(dict.fromkeys(nodes), levels),
+            sweeps=() if plan.waits else self._scanner.told_sweeps(dict.fromkeys(nodes), levels),
         )
 
-    def _sorties(self, levels: Sequence[int]) -> Sorties:
-        return Sorties(self._site, self._legs, self._battery, self._scanner, levels)
+    def _sorties(self, levels: Sequence[int], plan: FlightPlan) -> Sorties:
+        return Sorties(self._site, self._legs, self._battery, self._scanner, levels, by_stopping=plan.waits)
 
     def _check(self, nodes: Sequence[str], levels: Sequence[int]) -> None:
         if not nodes:

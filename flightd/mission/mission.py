@@ -166,11 +166,14 @@ class Mission:
         """What is told of the plan that is flown, or would be with the next start."""
         return self._plan.standing(self.visited, self.remaining)
 
-    def planned(self, nodes: Sequence[str], levels: Sequence[int], *, best_order: bool) -> PlannedFlight:
+    def planned(
+        self, nodes: Sequence[str], levels: Sequence[int], *, best_order: bool, waits: bool = False
+    ) -> PlannedFlight:
         """What a flight over the nodes would be, from the pad that it stands on first and with the battery as
         it is told now (none: what the configuration says); changes nothing.  InputError where it
         cannot be flown."""
-        return self._plan.planned(nodes, levels, self._charging.charge, best_order=best_order)
+        charge = self._charging.charge
+        return self._plan.planned(nodes, levels, charge, best_order=best_order, waits=waits)
 
     def outlook(self, now_ns: int) -> Outlook:
         """What it expects and what troubles it."""

@@ -34,7 +34,7 @@ class PlanInHand:
             self.plan, self.id, self._levels = plan, command.id, command.levels
         else:
             self.plan, self.id, self._levels = self._configured, "", ()
-        self._scanner.choose(self._levels)
+        self._scanner.choose(self._levels, by_stopping=self.plan.waits)
         text = f"{self.plan.nodes} nodes" if command.nodes else "as configured again"
         text += f", counted on level {', '.join(map(str, self._levels))}" if self._levels else ""
         return f"{text}, to hold at the last" if self.plan.waits else text
@@ -45,11 +45,20 @@ class PlanInHand:
         return StandingPlan(self.id, nodes, self._levels, tuple(visited), remaining)
 
     def planned(
-        self, nodes: Sequence[str], levels: Sequence[int], charge: tuple[float, float], *, best_order: bool
+        self,
+        nodes: Sequence[str],
+        levels: Sequence[int],
+        charge: tuple[float, float],
+        *,
+        best_order: bool,
+        waits: bool,
     ) -> PlannedFlight:
-        """What a flight over the nodes (none: as configured) would be from a battery of `charge`: its share
-        (0..1) and the share used in each second of flight.  InputError where it cannot be flown."""
+        """What a flight over the nodes (none: as configured), home or (`waits`) to hold at the last, would be
+        from a battery of `charge`: its share (0..1) and the share used in each second of flight.  InputError
+        where it cannot be flown."""
         plan, levels = self._configured, tuple(levels) if nodes else ()
+        if waits:
+            nodes = nodes or [stop.node for stop in plan.stops if stop.visit]
         if nodes:
-            plan = self._chosen.plan(nodes, levels, best_order=best_order)
+            plan = self._chosen.plan(nodes, levels, best_order=best_order, waits=waits)
         return self._chosen.estimate(plan, levels, *charge)

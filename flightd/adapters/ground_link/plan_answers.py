@@ -37,7 +37,9 @@ class PlanAnswers:
             return Code.BUSY, f"more than {_PLANS_PER_S} plans a second"
         self._lately.append(now_ns)
         try:
-            plan = self._planner.planned(request.nodes, request.levels, best_order=request.best_order)
+            plan = self._planner.planned(
+                request.nodes, request.levels, best_order=request.best_order, waits=request.waits
+            )
         except InputError as err:
             return Code.PLAN, str(err)
         return Planned(

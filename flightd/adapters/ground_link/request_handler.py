@@ -261,7 +261,7 @@ class RequestHandler:
             seen_ns=request.seen_ns,
             waits=request.waits,
         )
-        if request.waits and not request.nodes:
+        if request.waits and not request.nodes and not request.dry:
             return Code.MALFORMED, "a plan that waits at its end has nodes"
         if self._plans is None:
             return Code.UNAVAILABLE, "no flight is planned here yet; ask again in a moment"

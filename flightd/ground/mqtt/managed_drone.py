@@ -306,8 +306,7 @@ class ManagedDrone:
         """AUTOMATIC where the manager may fly the drone."""
         may = self._rules is not None and not self._taken and self._welcome is not None
         if may and self._welcome is not None:
-            counts_by_stopping = self._standing is None or not self._standing.sweeps
-            may = self._welcome["role"] == "operator" and counts_by_stopping
+            may = self._welcome["role"] == "operator"
         return OperatingMode.AUTOMATIC if may and takes_orders(status, self._plans) else OperatingMode.MANUAL
 
     def _arrived(self, status: StatusReport) -> list[Input]:
@@ -408,7 +407,8 @@ class ManagedDrone:
         """Where it stands, and how far it could fly."""
         try:
             if self._standing is None:
-                self._standing = Standing.of(await link.plan_flight((), (), dry=True, by_person=False))
+                own = await link.plan_flight((), (), dry=True, waits=True, by_person=False)
+                self._standing = Standing.of(own)
                 self._asked_at_s = -_ASK_AGAIN_S
             if self._return.is_due(now_s):
                 await self._return.ask(link, now_s)

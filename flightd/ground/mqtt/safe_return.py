@@ -24,13 +24,11 @@ _BETWEEN_S = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """What a drone that waits for its start tells of itself: the node that it stands on, whether it counts
-    and whether that is in passing, and its seconds for each metre of its own plan, take-off and landing with
-    it."""
+    """What a drone that waits for its start tells of itself: the node that it stands on, whether it counts,
+    and its seconds for each metre of its own plan, take-off and landing with it."""
 
     node: str
     counts: bool
-    sweeps: bool
     pace_s: float
 
     @classmethod
@@ -39,7 +37,6 @@ class Standing:
         return cls(
             planned.way[0],
             planned.places > 0,
-            any(each.swept for each in planned.sweeps),
             planned.seconds / max(planned.way_m, 1.0),
         )
 
@@ -96,6 +93,7 @@ class SafeReturn:
 async def _comes_home(link: DroneLink, nodes: Sequence[str]) -> bool:
     """Whether the drone flies over the nodes and home on the battery that is in it."""
     try:
-        return (await link.plan_flight(nodes, (), dry=True, by_person=False)).batteries <= 1
+        planned = await link.plan_flight(nodes, (), dry=True, waits=True, by_person=False)
     except InputError:
         return False
+    return planned.batteries <= 1

@@ -49,7 +49,7 @@ class Sorties:
     """The battery against the ways of one site.  `step` at each tick; the rest answers questions.
 
     With a `scanner` a stop lasts as long as what it has left to count there; with `levels` as long as what
-    hangs on these, whether or not it is counted already."""
+    hangs on these, whether or not it is counted already, in passing or only `by_stopping`."""
 
     def __init__(
         self,
@@ -58,8 +58,11 @@ class Sorties:
         battery: BatteryConfig,
         scanner: AnyScanner = NO_SCAN,
         levels: Sequence[int] | None = None,
+        *,
+        by_stopping: bool = False,
     ) -> None:
         self._levels = levels
+        self._by_stopping = by_stopping
         self._site = site
         self._legs = legs
         self._scanner = scanner
@@ -156,7 +159,7 @@ class Sorties:
     def stop_s(self, node: str) -> float:
         """Seconds of the stop at a node."""
         pace = self._legs.pace
-        counted_s = self._scanner.stop_s(node, pace, self._levels)
+        counted_s = self._scanner.stop_s(node, pace, self._levels, by_stopping=self._by_stopping)
         return counted_s or pace.dwell_s
 
     def _out_s(self, on_s: float, there: str) -> float:

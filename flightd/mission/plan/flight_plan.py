@@ -29,11 +29,12 @@ class HeadingPolicy:
     long_side_ahead: bool = True
 
     @classmethod
-    def of(cls, config: Config) -> HeadingPolicy:
+    def of(cls, config: Config, site: Site) -> HeadingPolicy:
         """The mission's heading, flown with the configured down camera; nose to the shelf where shelves are
-        flown past with a camera that looks ahead."""
+        flown past, or stopped before by who might, with a camera that looks ahead."""
         ahead = abs(config.front_camera.mount_yaw_deg) < _AHEAD_DEG
-        swept = config.scan.mode is ScanMode.SWEEP and config.front_camera.is_fitted and ahead
+        counts = config.front_camera.is_fitted and bool(site.locations)
+        swept = config.scan.mode is ScanMode.SWEEP and counts and ahead
         return cls(Heading.SHELF if swept else config.mission.heading, config.camera.long_side_ahead)
 
 

@@ -31,13 +31,20 @@ class NoScan:
     def wants(self, _node: str) -> bool:
         return False
 
-    def stop_s(self, _node: str, _pace: Pace, _levels: Sequence[int] | None = None) -> float:
+    def stop_s(
+        self,
+        _node: str,
+        _pace: Pace,
+        _levels: Sequence[int] | None = None,
+        *,
+        by_stopping: bool = False,  # noqa: ARG002 - named by who asks
+    ) -> float:
         return 0.0
 
     def places_at(self, _node: str, _levels: Sequence[int] = ()) -> frozenset[str]:
         return frozenset()
 
-    def choose(self, levels: Sequence[int]) -> None:
+    def choose(self, levels: Sequence[int], *, by_stopping: bool = False) -> None:
         """Nothing is counted anyway."""
 
     def skip(self, locations: Iterable[str]) -> None:

@@ -71,6 +71,7 @@ class Scanner:
         self._sightings: list[Sighting] = []
         self._begun = self._begun_blind = 0
         self._relights = True
+        self._by_stopping = False
         self.doubted = False
 
     # What the mission asks
@@ -118,12 +119,17 @@ class Scanner:
         """Whether locations of a node are left to count."""
         return not self.doubted and bool(self._left(node))
 
-    def stop_s(self, node: str, pace: Pace, levels: Sequence[int] | None = None) -> float:
+    def stop_s(
+        self, node: str, pace: Pace, levels: Sequence[int] | None = None, *, by_stopping: bool = False
+    ) -> float:
         """How long the count of what is left at a node takes, each view looked from once; with `levels` that
-        of what hangs on these (empty: on any), counted already or not.  0 where nothing is to be counted."""
-        if levels is None and not self.wants(node):
-            return 0.0
-        swept_s = self._passed_s(node, pace, levels)
+        of what hangs on these (empty: on any), counted already or not, in passing or only `by_stopping`.  0
+        where nothing is to be counted."""
+        if levels is None:
+            if not self.wants(node):
+                return 0.0
+            by_stopping = self._by_stopping
+        swept_s = 0.0 if by_stopping else self._passed_s(node, pace, levels)
         if swept_s:
             return swept_s
         places = self._left(node) if levels is None else self.places_at(node, levels)
@@ -135,8 +141,10 @@ class Scanner:
         found = frozenset(self._planner.locations(node))
         return frozenset(code for code in found if self._levels[code] in levels) if levels else found
 
-    def choose(self, levels: Sequence[int]) -> None:
-        """Count only what hangs on these levels; on all of them where there are none."""
+    def choose(self, levels: Sequence[int], *, by_stopping: bool = False) -> None:
+        """Count only what hangs on these levels; on all of them where there are none.  `by_stopping`: nothing
+        in passing, which chooses its way itself."""
+        self._by_stopping = by_stopping
         among = self._planned
         self._wanted = frozenset(code for code in among if self._levels[code] in levels) if levels else among
 
@@ -232,7 +240,7 @@ class Scanner:
     def legs(self, run: Sequence[str], here: str, yaw_rad: float, height_m: float) -> tuple[SweepLeg, ...]:
         """The legs past what is left to count at the nodes `run` of an aisle, for a drone over its node
         `here`; none where all is counted by stopping."""
-        if self._sweeps is None or self.doubted:
+        if self._sweeps is None or self._by_stopping or self.doubted:
             return ()
         left = frozenset(code for node in run for code in self._left(node)) - self._swept
         return self._sweeps.legs(run, left, here, yaw_rad, height_m) if left else ()

@@ -186,7 +186,7 @@ def test_a_closed_line_is_no_way_and_lengthens_the_way_home() -> None:
 
 def test_a_base_leads_no_further_than_the_battery_brings_the_drone_home() -> None:
     ways, back = WaysHome(floor_status(SITE)), SafeReturn()
-    standing = Standing("A1", counts=False, sweeps=False, pace_s=2.0)
+    standing = Standing("A1", counts=False, pace_s=2.0)
     ahead = ["A2", "A3", "A4"]  # 3.0, 5.4 and 9.0 m there and back
     for left_s, reach in ((30.0, 3), (11.0, 2), (5.9, 0), (None, 3)):
         told = status(Phase.FOLLOW, "A2 A1", battery_left_s=left_s)

@@ -50,7 +50,7 @@ class Sweep(Flight):
         params = params or config()
         scanner = scanner_of(params, site)
         assert isinstance(scanner, Scanner)
-        super().__init__(params, site, scanner, HeadingPolicy.of(params))
+        super().__init__(params, site, scanner, HeadingPolicy.of(params, site))
         self.scanner = scanner
         self.front = IdealFront(site, SIGHT, stock or Stock(labels_of(site)))
         self.legs: list[SweepLeg] = []
@@ -290,4 +290,25 @@ def test_a_camera_that_looks_aside_flies_nose_along_and_past_the_same() -> None:
     scanner = scanner_of(aside, SITE)
     legs = scanner.legs(("A1", "A2", "A3", "A4"), "A1", 0.0, 1.6)
     assert {abs(round(math.degrees(leg.yaw_rad))) for leg in legs} == {0, 180}
-    assert HeadingPolicy.of(aside).heading is configured().mission.heading
+    assert HeadingPolicy.of(aside, SITE).heading is configured().mission.heading
+
+
+def test_a_plan_that_is_led_on_from_node_to_node_is_counted_by_stopping() -> None:
+    """In passing the drone would fly along the aisle where nobody has released it to."""
+    flight = Sweep(config().with_values(mission={"autostart": False}))
+    flight.run(0.2)
+    passing = flight.mission.planned(("A2", "A3"), (), best_order=False)
+    flight.order(CommandKind.PLAN, nodes=("A2", "A3"), waits=True)
+    flight.order(CommandKind.START)
+    flight.fly(until=lambda: flight.phase is Phase.HOLD)
+    assert (flight.phase, flight.mission.goal.node) == (Phase.HOLD, "A3")
+    assert not flight.legs
+    assert flight.scanned == {"A2", "A3"} == set(flight.said("visited"))
+    assert set(flight.states) == {code for code in PLACES if SITE.locations[code].node in flight.scanned}
+    flight.order(CommandKind.HOME)
+    flight.fly()
+    flight.down()
+    stopping = flight.mission.planned(("A2", "A3"), (), best_order=False, waits=True)
+    assert passing.sweeps
+    assert not stopping.sweeps
+    assert stopping.seconds > passing.seconds
