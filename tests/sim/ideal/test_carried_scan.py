@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
+from flightd.config.sweep import ScanMode
 from flightd.core.inventory import LocationState
 from flightd.core.types import Phase
 from flightd.site.site import Site
@@ -16,7 +17,9 @@ from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.sim.ideal.test_carried import wrong_visits
 from tests.unit.mission.shelves import FITTED, SIGHT
 
-CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(front_camera=FITTED)
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(
+    front_camera=FITTED, scan={"mode": ScanMode.STOP}
+)
 ALIKE = parse_site(
     """
 [site]

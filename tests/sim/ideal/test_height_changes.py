@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from flightd.config.schema import load_config
+from flightd.config.sweep import ScanMode
 from flightd.core.tracks import TrackSet
 from flightd.core.types import Phase
 from flightd.site.site_file import parse_site
@@ -16,7 +17,9 @@ from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import FITTED, SIGHT
 
-CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(front_camera=FITTED)
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(
+    front_camera=FITTED, scan={"mode": ScanMode.STOP}
+)
 SITE = parse_site(
     """
 [site]

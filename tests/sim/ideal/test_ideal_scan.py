@@ -13,6 +13,7 @@ import pytest
 
 from flightd.config.mission import Heading
 from flightd.config.schema import load_config
+from flightd.config.sweep import ScanMode
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import Finding
 from flightd.core.types import Command, CommandKind, EventLevel, Phase
@@ -22,7 +23,9 @@ from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import FITTED, SIGHT, SITE
 
-CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(front_camera=FITTED)
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(
+    front_camera=FITTED, scan={"mode": ScanMode.STOP}
+)
 NODES = ("A2", "A3")
 PLACES = [place.code for place in SITE.locations.values() if place.node in NODES]
 EMPTY, TORN, COVERED, TWO, *READ = PLACES

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flightd.config.schema import load_config
+from flightd.config.sweep import ScanMode
 from flightd.core.flight_order import ChosenPlan
 from flightd.core.planned_flight import PlannedFlight
 from flightd.core.topics import Topic
@@ -14,7 +15,7 @@ from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import FITTED, SIGHT, SITE
 
 CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(
-    front_camera=FITTED, mission={"autostart": False, "start_countdown_s": 0.0}
+    front_camera=FITTED, scan={"mode": ScanMode.STOP}, mission={"autostart": False, "start_countdown_s": 0.0}
 )
 ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE}
 
