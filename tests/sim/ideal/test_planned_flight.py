@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightd.config.schema import load_config
+from flightd.config.schema import Config, load_config
 from flightd.config.sweep import ScanMode
 from flightd.core.flight_order import ChosenPlan
 from flightd.core.planned_flight import PlannedFlight
@@ -20,10 +20,10 @@ CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_va
 ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE}
 
 
-def flown(*nodes: str, levels: tuple[int, ...] = ()) -> tuple[Flown, PlannedFlight]:
+def flown(*nodes: str, levels: tuple[int, ...] = (), config: Config = CONFIG) -> tuple[Flown, PlannedFlight]:
     """The flight of a plan that comes once the drone is ready, and what was said of it before."""
     stock = Stock({code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in SITE.locations})
-    flight = IdealFlight(SITE, CONFIG, front=IdealFront(SITE, SIGHT, stock))
+    flight = IdealFlight(SITE, config, front=IdealFront(SITE, SIGHT, stock))
     mission = flight.pilot.mission
     said: list[PlannedFlight] = []
     kept: list[object] = []
@@ -52,3 +52,15 @@ def test_it_counts_the_chosen_level_of_the_chosen_nodes_in_about_the_time_that_w
     assert said.places == len(wanted)
     air_s = 0.02 * sum(output.phase not in ON_GROUND for output in flight.outputs)
     assert 0.9 < said.seconds / air_s < 1.4, "a view is often over before its longest"
+
+
+def test_in_passing_it_takes_about_the_time_that_was_said_too() -> None:
+    nodes = tuple(SITE.nodes)
+    flight, said = flown(*nodes, config=CONFIG.with_values(scan={"mode": ScanMode.SWEEP}))
+    assert (flight.phase, set(flight.visited)) == (Phase.DONE, set(nodes))
+    assert any(each.swept for each in said.sweeps)
+    assert {finding.location for output in flight.outputs for finding in output.findings} == set(
+        SITE.locations
+    )
+    air_s = 0.02 * sum(output.phase not in ON_GROUND for output in flight.outputs)
+    assert 0.9 < said.seconds / air_s < 1.5, "the ways between its nodes are counted beside the passes"
