@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from flightd.fleet.traffic.closures import Closure
 from flightd.fleet.traffic.distances import Distances
 from flightd.fleet.traffic.dock_queue import DockQueue, Standing
 from flightd.fleet.traffic.docks import Dock
@@ -29,6 +30,7 @@ _SPARE_FRAC: Final = 0.25
 _SPARE_MS: Final = 45_000
 _SLOWER: Final = 1.15
 """What a flight takes beside what was planned, at most on average."""
+_NO_WAY: Final = "there is no way there"
 _WITH_SPARE: Final = _SLOWER * (1 + _SPARE_FRAC)
 
 
@@ -86,7 +88,8 @@ class Dispatcher:
         self._comes_back: set[str] = set()
         """Those that were taken up in the air, and have told nothing since."""
         self._tries: dict[str, int] = {}
-        self._shut: dict[str, str] = {}
+        self.closed: dict[str, Closure] = {}
+        """What nobody flies, by name."""
         self._refusals: dict[str, int] = {}
         self.holding = 0
 
@@ -101,27 +104,27 @@ class Dispatcher:
         if now_ms >= self._next_try_ms.get("urgent", 0):
             self._next_try_ms["urgent"] = now_ms + _RETRY_MS
             self._bring_home(now_ms)
+        self._leave_closed()
         self._fly_on(now_ms)
         self._give_tours(now_ms)
         self._fill_batteries(now_ms)
         return Commands(self.control.release(now_ms, self._comes_home), self.control.paused())
 
-    def shut(self, aisle_nodes: Mapping[str, str], reason: str, now_ms: int) -> None:
-        """Close the lanes between these nodes (node to its next one)."""
-        lanes = self.control.lanes.lanes_between(aisle_nodes.items())
-        self._held |= set(self.control.close(lanes, now_ms))
-        nodes = {*aisle_nodes, *aisle_nodes.values()}
-        self._shut |= dict.fromkeys(nodes, reason)
-        self._settle_tours()
-        self.queue.hand_back([node for node in self.queue.open if node in nodes], reason)
-
-    def unshut(self, aisle_nodes: Mapping[str, str]) -> None:
-        """Open them again."""
-        self.control.open(self.control.lanes.lanes_between(aisle_nodes.items()))
-        nodes = {*aisle_nodes, *aisle_nodes.values()}
-        for node in nodes:
-            self._shut.pop(node, None)
-        self.queue.retry(nodes)
+    def close(self, closures: Iterable[Closure], now_ms: int) -> None:
+        """Keep these closed, and nothing else."""
+        wanted = {closure.name: closure for closure in closures}
+        gone = [closure for name, closure in self.closed.items() if wanted.get(name) != closure]
+        for closure in gone:
+            del self.closed[closure.name]
+            self.control.open(closure.name)
+            self._free({*closure.nodes, *(n for n, why in self.queue.reasons.items() if why == _NO_WAY)})
+        new = [closure for name, closure in wanted.items() if name not in self.closed]
+        for closure in new:
+            self.closed[closure.name] = closure
+            lanes = self.control.lanes.lanes_between(closure.ways)
+            self._held |= set(self.control.close(closure.name, lanes, now_ms))
+        if new:
+            self._settle_tours()
 
     def withdraw(
         self,
@@ -233,9 +236,23 @@ class Dispatcher:
             kept = {lanes.vertices[vertex].node for vertex in visits}
             lost = nodes - kept
             if lost:
-                for node in lost:
-                    self.queue.hand_back([node], self._shut.get(node, ""))
+                self.queue.hand_back(lost)
                 self._tours[drone] = nodes & kept
+
+    def _leave_closed(self) -> None:
+        """What lies in closed air, or behind it for every drone, is not done meanwhile."""
+        for closure in self.closed.values():
+            self.queue.hand_back([node for node in self.queue.open if node in closure.nodes], closure.why)
+        if self.closed:
+            behind = set(self.queue.open).intersection(*map(self._behind_closed, self.control.drones))
+            self.queue.hand_back(behind, _NO_WAY)
+
+    def _behind_closed(self, drone: str) -> set[str]:
+        """The nodes that wait, and from which this drone would not come home."""
+        if not self.closed:
+            return set()
+        lanes, leads_home = self.control.lanes, self.control.closed.leads_to(self.docks.home(drone))
+        return {node for node in self.queue.open if lanes.over(node) not in leads_home}
 
     def _watch(self, drone: str, now_ms: int) -> None:
         """Home in time, round who is in doubt for long, another way for who waits for long."""
@@ -379,7 +396,8 @@ class Dispatcher:
         left_ms = self._left_ms(drone)
         budget_ms = int(left_ms / _WITH_SPARE)
         busy = {self.queue.work(node).aisle for node in self.queue.given}
-        nodes = self.queue.tour(self._times(course.place, home), budget_ms, busy, most, drone)
+        behind = self._behind_closed(drone)
+        nodes = self.queue.tour(self._times(course.place, home), budget_ms, busy, most, drone, behind)
         ends = (home,)
         while nodes:
             if not self.control.give(drone, [self._stop(node) for node in nodes], ends, now_ms):
@@ -400,7 +418,7 @@ class Dispatcher:
         if len(nodes) == 1:
             tries = self._tries[nodes[0]] = self._tries.get(nodes[0], 0) + 1
             if tries >= _TRIES:
-                self.queue.hand_back(nodes, "there is no way there")
+                self.queue.hand_back(nodes, _NO_WAY)
 
     def _stop(self, node: str) -> Stop:
         lanes = self.control.lanes

@@ -147,6 +147,11 @@ class LaneGraph:
             return self.vertices[lane.a].node, self.vertices[lane.b].node
         return (self._nodes[number - len(self.lanes)],)
 
+    def ends_of(self, lane: int) -> tuple[int, int]:
+        """The vertices between which a lane leads, by its number among the resources."""
+        found = self.lanes[lane - len(self.vertices)]
+        return found.a, found.b
+
     def lanes_between(self, pairs: Iterable[tuple[str, str]]) -> frozenset[int]:
         """The resources of the lanes over the lines between these pairs of nodes, at every level."""
         wanted = {frozenset(pair) for pair in pairs}

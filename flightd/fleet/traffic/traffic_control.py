@@ -14,6 +14,7 @@ from typing import Final, TypeAlias
 
 from flightd.fleet.traffic.action_graph import ActionGraph, Course
 from flightd.fleet.traffic.cells import CellSize, Conflicts, conflicts_of, within
+from flightd.fleet.traffic.closures import ClosedAir
 from flightd.fleet.traffic.drone_course import DroneCourse
 from flightd.fleet.traffic.lanes import LaneGraph
 from flightd.fleet.traffic.motions import NEVER, Act, MotionNet, at_rest
@@ -41,7 +42,7 @@ class TrafficControl:
         self._cell = cell
         self._planner = PrioritisedPlanner(self.net, self.conflicts)
         self.drones: dict[str, DroneCourse] = {}
-        self._closed: frozenset[int] = frozenset()
+        self.closed = ClosedAir(lanes)
         self._avoided: dict[str, frozenset[int]] = {}
         self._graph = ActionGraph({}, self.conflicts)
         self.replans = 0
@@ -68,9 +69,12 @@ class TrafficControl:
                 return False
         return True
 
-    def is_clear(self, drone: str, air: Iterable[int]) -> bool:
-        """Whether nobody else may be in this air now, or was released into it."""
+    def is_clear(self, drone: str, air: Iterable[int], here: Collection[int] = ()) -> bool:
+        """Whether nobody else may be in this air now, or was released into it, and nothing of it is closed
+        for who leaves from `here`."""
         wanted = frozenset(air)
+        if not wanted.isdisjoint(self.closed.shut_for(here)):
+            return False
         near = wanted.union(*(self.conflicts[resource] for resource in wanted))
         zones = self.closed_by()
         return all(
@@ -215,7 +219,7 @@ class TrafficControl:
     ) -> tuple[str, ...]:
         todo = {drone for drone in todo if not self.drones[drone].failed}
         holding: set[str] = set()
-        shut = self._closed.union(*self._avoided.values())
+        shut, _ = self._shut(())
         for drone in todo:
             course = self.drones[drone]
             course.stops = tuple(stop for stop in course.stops if stop.vertex not in shut)
@@ -303,15 +307,14 @@ class TrafficControl:
 
     def _shut(self, drones: Iterable[str]) -> tuple[frozenset[int], dict[str, frozenset[int]]]:
         """What is closed, and what for those who stand in it."""
-        avoided = self._closed.union(*self._avoided.values())
+        zones = (*self.closed.zones, *self._avoided.values())
         inside: dict[str, frozenset[int]] = {}
         for drone in drones:
-            course = self.drones[drone]
-            at = set(course.air)
-            zones = [zone for zone in (self._closed, *self._avoided.values()) if at.isdisjoint(zone)]
-            if len(zones) <= len(self._avoided):
-                inside[drone] = frozenset().union(*zones)
-        return avoided, inside
+            at = set(self.drones[drone].air)
+            others = [zone for zone in zones if at.isdisjoint(zone)]
+            if len(others) < len(zones):
+                inside[drone] = frozenset().union(*others)
+        return frozenset().union(*zones), inside
 
     def _adopt(self, projected: Mapping[str, Sequence[Action]], plans: Mapping[str, Plan]) -> None:
         for drone, course in self.drones.items():
@@ -354,36 +357,31 @@ class TrafficControl:
         """Where nobody is planned on account of this drone."""
         return self._avoided.get(drone, frozenset())
 
-    def close(self, resources: Collection[int], now_ms: int) -> tuple[str, ...]:
+    def close(self, name: str, lanes: Collection[int], now_ms: int) -> tuple[str, ...]:
         """Nobody enters these any more; who is in there leaves.  Returns those for which there is no way."""
-        self._closed = self._closed | frozenset(resources) | self._enclosed(resources)
-        vertices = {lane_end for r in resources for lane_end in self._ends(r)}
+        zone = self.closed.close(name, lanes)
+        ends = {vertex for lane in lanes for vertex in self.lanes.ends_of(lane)}
         for course in self.drones.values():
-            if any(stop.vertex in vertices for stop in course.stops):
-                course.stops = tuple(stop for stop in course.stops if stop.vertex not in vertices)
-        return self._replan_met(self.projected(now_ms), self._closed, now_ms)
+            course.stops = tuple(stop for stop in course.stops if stop.vertex not in ends)
+        return self._replan_met(self.projected(now_ms), zone, now_ms)
 
-    def _enclosed(self, lanes: Collection[int]) -> set[int]:
-        """The vertices from which no other lanes lead than these, and the columns over them."""
-        arcs = self.lanes.arcs
-        inside = {
-            vertex
-            for lane in lanes
-            for vertex in self._ends(lane)
-            if all(arc.resource in lanes for arc in arcs[vertex])
-        }
-        return inside | {self.lanes.column_of[self.lanes.vertices[vertex].node] for vertex in inside}
-
-    def _ends(self, resource: int) -> tuple[int, ...]:
-        number = resource - len(self.lanes.vertices)
-        if 0 <= number < len(self.lanes.lanes):
-            lane = self.lanes.lanes[number]
-            return lane.a, lane.b
-        return (resource,)
-
-    def open(self, resources: Collection[int]) -> None:
+    def open(self, name: str) -> None:
         """They may be flown again."""
-        self._closed = self._closed - frozenset(resources) - self._enclosed(resources)
+        self.closed.open(name)
+
+    def inside(self) -> dict[str, tuple[str, ...]]:
+        """Each drone that may be in air that is closed, or was released into it, and the names of that."""
+        zones = self.closed_by()
+        found = {
+            drone: self.closed.within(zones[drone] if course.doubt_m > 0.0 else course.wreck or course.air)
+            for drone, course in self.drones.items()
+        }
+        return {drone: names for drone, names in found.items() if names}
+
+    def is_cut_off(self, drone: str) -> bool:
+        """Whether no way leads to its pad but through what is closed."""
+        course = self.drones[drone]
+        return all(course.place not in self.closed.leads_to(end) for end in course.ends)
 
     def doubt(self, drone: str, doubt_m: float, now_ms: int) -> None:
         """A drone may be so far beside where it should be, beyond what its cell allows for; 0: it is sure."""

@@ -153,12 +153,15 @@ class WorkQueue:
         busy_aisles: Collection[str] = (),
         most: int = MOST_OF_TOUR,
         drone: str = "",
+        without: Collection[str] = (),
     ) -> tuple[str, ...]:
-        """The nodes of one tour of a drone within a budget: first the most valuable aisle that nobody flies
+        """The nodes of one tour of a drone within a budget, `without` some: first the most valuable aisle that nobody flies
         in, or that has work for this drone alone, from its nearer end on, then what lies nearest.  Empty
         where nothing fits."""
         aisles: dict[str, list[NodeWork]] = {}
         for node in self._open:
+            if node in without:
+                continue
             work = self._work[node]
             named = bool(drone) and work.drone == drone
             if named or (not work.drone and work.aisle not in busy_aisles):

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import msgspec
 
 from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.closures import Closure
 from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
 from flightd.fleet.traffic.dock_queue import KeptTries
 from flightd.fleet.traffic.docks import Dock
@@ -51,12 +52,11 @@ class KeptDrone:
 
 @dataclass(frozen=True, slots=True)
 class KeptHub:
-    """What outlives a hub; `shut` are the nodes of a closed aisle, each with its next one, and why."""
+    """What outlives a hub."""
 
     drones: Mapping[str, KeptDrone]
     work: KeptWork
-    shut: Mapping[str, str]
-    why_shut: str
+    closed: tuple[Closure, ...]
     docks: Mapping[str, KeptTries]
 
 
@@ -96,8 +96,6 @@ class FleetHub:
         """Actions of its life that were done when this hub took it."""
         self._lost_m: dict[str, float] = {}
         """By how much the places of those are doubted that failed."""
-        self._shut: Mapping[str, str] = {}
-        self._why_shut = ""
         for drone, pad in plan.homes.items():
             self.control.enter(drone, pad)
             self._first[drone] = 0
@@ -113,15 +111,14 @@ class FleetHub:
         for drone, one in known.drones.items():
             hub.dispatcher.withdraw(drone, one.place, one.air, one.doubt_m, now_ms)
         hub.dispatcher.docks.remember(known.docks)
-        if known.shut:
-            hub.shut(known.shut, known.why_shut, now_ms)
+        hub.close(known.closed, now_ms)
         return hub
 
     def keep(self) -> bytes:
         """What the next one has to know."""
         drones = {drone: self._kept(drone) for drone in self.control.drones}
         docks = self.dispatcher.docks.kept()
-        kept = KeptHub(drones, self.queue.kept(), dict(self._shut), self._why_shut, docks)
+        kept = KeptHub(drones, self.queue.kept(), tuple(self.dispatcher.closed.values()), docks)
         return msgspec.json.encode(kept)
 
     def _kept(self, drone: str) -> KeptDrone:
@@ -131,15 +128,9 @@ class FleetHub:
         done, doubt_m = self._first[drone] + course.done, self._lost_m.get(drone, course.doubt_m)
         return KeptDrone(course.place, done, doubt_m, tuple(course.base), tuple(course.wreck))
 
-    def shut(self, aisle_nodes: Mapping[str, str], why: str, now_ms: int) -> None:
-        """Close an aisle."""
-        self._shut, self._why_shut = aisle_nodes, why
-        self.dispatcher.shut(aisle_nodes, why, now_ms)
-
-    def unshut(self) -> None:
-        """Open it."""
-        self.dispatcher.unshut(self._shut)
-        self._shut = {}
+    def close(self, closures: Iterable[Closure], now_ms: int) -> None:
+        """Keep these closed, and nothing else."""
+        self.dispatcher.close(closures, now_ms)
 
     def step(self, now_ms: int, reports: Iterable[DroneReport]) -> dict[str, Told]:
         """What each drone is told; those without a link hear it when they have one."""

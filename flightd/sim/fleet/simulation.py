@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.closures import Closure
 from flightd.fleet.traffic.dispatcher import DroneReport
 from flightd.fleet.traffic.dock_queue import docks_of
 from flightd.fleet.traffic.docks import Dock
@@ -180,8 +181,9 @@ class FleetSimulation:
             self.world.drones[name].fails_after_s = rng.uniform(*scenario.fails_s)
         aisle = rng.choice([aisle for aisle in self.site.aisles if aisle.shelves])
         nodes = [node.id for node in self.site.aisle_nodes(aisle.id)][1:-1]
-        self._closing = dict(itertools.pairwise(nodes))
         self.closed_aisle = aisle.id
+        why = f"aisle {aisle.id} is closed"
+        self._closure = Closure(aisle.id, tuple(itertools.pairwise(nodes)), why)
         self.now_s = 0.0
 
     @property
@@ -200,7 +202,7 @@ class FleetSimulation:
             if steps % _HUB_STEPS == 0 and (hub := self._hub or self._started(at_s)) is not None:
                 if closes and at_s >= closes[0]:
                     closes.pop(0)
-                    self._close(hub, int(at_s * 1000), shuts=len(closes) == 1)
+                    hub.close([self._closure] if closes else [], int(at_s * 1000))
                 self._step(hub, at_s)
                 if len(self.queue.done) > done:
                     done, last_s = len(self.queue.done), at_s
@@ -214,12 +216,6 @@ class FleetSimulation:
             if not left and not any(self.world.flies(drone) for drone in drones):
                 break
         return self._result(at_s, last_s)
-
-    def _close(self, hub: FleetHub, now_ms: int, *, shuts: bool) -> None:
-        if shuts:
-            hub.shut(self._closing, f"aisle {self.closed_aisle} is closed", now_ms)
-        else:
-            hub.unshut()
 
     def _started(self, at_s: float) -> FleetHub | None:
         """A new hub, once the old one was away for long enough."""

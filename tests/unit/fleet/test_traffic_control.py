@@ -164,12 +164,12 @@ def test_a_closed_aisle_is_left_and_not_entered() -> None:
     assert floor.give("d1", "C3", "C4")
     floor.until("d0", "A4")
     lanes = floor.lanes.lanes_between((f"A{i}", f"A{i + 1}") for i in range(2, 7))
-    assert floor.control.close(lanes, floor.now_ms) == ()
+    assert floor.control.close("A", lanes, floor.now_ms) == ()
     floor.run()
     assert [floor.at(drone) for drone in ("d0", "d1")] == ["pad P1", "pad P2"]
     assert "A5" not in floor.counted
     assert not floor.give("d2", "A5")
-    floor.control.open(lanes)
+    floor.control.open("A")
     assert floor.give("d2", "A5")
     floor.run()
     assert "A5" in floor.counted
@@ -215,10 +215,10 @@ def test_without_any_way_a_drone_holds_until_there_is_one() -> None:
     assert floor.give("d0", "A4")
     floor.until("d0", "A4")
     lanes = floor.lanes.lanes_between([("A1", "A2"), ("A2", "A3"), ("A6", "A7"), ("A7", "A8")])
-    assert floor.control.close(lanes, floor.now_ms) == ("d0",)
+    assert floor.control.close("A", lanes, floor.now_ms) == ("d0",)
     floor.run()
     assert floor.at("d0") == "A4"
-    floor.control.open(lanes)
+    floor.control.open("A")
     assert floor.control.replan(["d0"], floor.now_ms) == ()
     floor.run()
     assert floor.at("d0") == "pad P1"

@@ -36,7 +36,7 @@ class Walk:
 
     def __init__(self) -> None:
         self.floor = Floor(4)
-        self.closed: set[int] = set()
+        self.closed: list[str] = []
 
     def happens(self, event: tuple[object, ...]) -> None:
         floor, control = self.floor, self.floor.control
@@ -60,16 +60,15 @@ class Walk:
             case ("fail", str(drone)) if not any(course.failed for course in control.drones.values()):
                 control.fail(drone, floor.now_ms)
             case ("close", set(lines)):
-                lanes = floor.lanes.lanes_between(lines)
-                self.closed |= lanes
-                control.close(lanes, floor.now_ms)
+                self.closed.append(f"closed {len(self.closed)}")
+                control.close(self.closed[-1], floor.lanes.lanes_between(lines), floor.now_ms)
             case ("open",):
                 self.open()
         floor.check()
 
     def open(self) -> None:
-        self.floor.control.open(self.closed)
-        self.closed = set()
+        while self.closed:
+            self.floor.control.open(self.closed.pop())
 
     def ends(self) -> None:
         """Everything is well again but for who failed: the others come home."""

@@ -1,0 +1,90 @@
+"""Ways that people have closed: nobody is planned into their air, or released into it, until they are open
+again, and who is in it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from flightd.fleet.traffic.lanes import UPRIGHT, LaneGraph
+
+
+@dataclass(frozen=True, slots=True)
+class Closure:
+    """The `ways`, each between two nodes, that are closed together; `why` is told of what waits there."""
+
+    name: str
+    ways: tuple[tuple[str, str], ...]
+    why: str
+
+    @property
+    def nodes(self) -> frozenset[str]:
+        """The ends of its ways: nothing is done there meanwhile."""
+        return frozenset(node for way in self.ways for node in way)
+
+
+class ClosedAir:
+    """The zones of one floor that are closed, by name: lanes, the vertices from which no other ones lead on,
+    and the columns over these."""
+
+    def __init__(self, lanes: LaneGraph) -> None:
+        self._lanes = lanes
+        self._zones: dict[str, frozenset[int]] = {}
+        self._ways_home: dict[int, frozenset[int]] = {}
+
+    def close(self, name: str, lanes: Iterable[int]) -> frozenset[int]:
+        """Close these lanes at every level; the zone."""
+        closed = frozenset(lanes)
+        self._zones[name] = zone = closed | self._enclosed(closed)
+        self._ways_home.clear()
+        return zone
+
+    def open(self, name: str) -> None:
+        """Open it again.  KeyError where nothing is closed by that name."""
+        del self._zones[name]
+        self._ways_home.clear()
+
+    @property
+    def zones(self) -> tuple[frozenset[int], ...]:
+        """All that is closed, each by itself."""
+        return tuple(self._zones.values())
+
+    def shut_for(self, air: Collection[int]) -> frozenset[int]:
+        """What is closed for who may be in this air: every zone but those in which he is."""
+        return frozenset().union(*(zone for zone in self.zones if zone.isdisjoint(air)))
+
+    def within(self, air: Collection[int]) -> tuple[str, ...]:
+        """The names of the zones in which somebody is who may be in this air."""
+        return tuple(name for name, zone in self._zones.items() if not zone.isdisjoint(air))
+
+    def leads_to(self, home: int) -> frozenset[int]:
+        """The vertices from which a way leads to this one over lanes that are open."""
+        found = self._ways_home.get(home)
+        if found is None:
+            found = self._ways_home[home] = self._leading_to(home)
+        return found
+
+    def _leading_to(self, home: int) -> frozenset[int]:
+        shut = frozenset().union(*self.zones)
+        onto: list[list[int]] = [[] for _ in self._lanes.vertices]
+        for vertex, arcs in enumerate(self._lanes.arcs):
+            for arc in arcs:
+                if arc.resource not in shut:
+                    onto[arc.to].append(vertex)
+        found, todo = {home}, [home]
+        while todo:
+            fresh = [vertex for vertex in onto[todo.pop()] if vertex not in found]
+            found.update(fresh)
+            todo += fresh
+        return frozenset(found)
+
+    def _enclosed(self, closed: frozenset[int]) -> frozenset[int]:
+        """The vertices from which no other lanes lead on than these, and the columns over them."""
+        lanes = self._lanes
+        ends = {end for lane in closed for end in lanes.ends_of(lane)}
+        inside = {
+            vertex
+            for vertex in ends
+            if all(arc.resource in closed or arc.quarter == UPRIGHT for arc in lanes.arcs[vertex])
+        }
+        return frozenset(inside | {lanes.column_of[lanes.vertices[vertex].node] for vertex in inside})
