@@ -3,7 +3,7 @@ again, and who is in it leaves."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from flightd.fleet.traffic.lanes import UPRIGHT, LaneGraph
@@ -53,9 +53,12 @@ class ClosedAir:
         """What is closed for who may be in this air: every zone but those in which he is."""
         return frozenset().union(*(zone for zone in self.zones if zone.isdisjoint(air)))
 
-    def within(self, air: Collection[int]) -> tuple[str, ...]:
-        """The names of the zones in which somebody is who may be in this air."""
-        return tuple(name for name, zone in self._zones.items() if not zone.isdisjoint(air))
+    def within(self, airs: Mapping[str, Collection[int]]) -> dict[str, tuple[str, ...]]:
+        """For each zone, by its name, who is in it of those that may be in these airs."""
+        return {
+            name: tuple(drone for drone, air in airs.items() if not zone.isdisjoint(air))
+            for name, zone in self._zones.items()
+        }
 
     def leads_to(self, home: int) -> frozenset[int]:
         """The vertices from which a way leads to this one over lanes that are open."""

@@ -104,7 +104,6 @@ class Dispatcher:
         if now_ms >= self._next_try_ms.get("urgent", 0):
             self._next_try_ms["urgent"] = now_ms + _RETRY_MS
             self._bring_home(now_ms)
-        self._leave_closed()
         self._fly_on(now_ms)
         self._give_tours(now_ms)
         self._fill_batteries(now_ms)
@@ -239,13 +238,14 @@ class Dispatcher:
                 self.queue.hand_back(lost)
                 self._tours[drone] = nodes & kept
 
-    def _leave_closed(self) -> None:
-        """What lies in closed air, or behind it for every drone, is not done meanwhile."""
-        for closure in self.closed.values():
-            self.queue.hand_back([node for node in self.queue.open if node in closure.nodes], closure.why)
-        if self.closed:
-            behind = set(self.queue.open).intersection(*map(self._behind_closed, self.control.drones))
-            self.queue.hand_back(behind, _NO_WAY)
+    def held_back(self) -> dict[str, str]:
+        """What waits for something to be opened: where nobody flies, or behind that for every drone; and
+        why."""
+        if not self.closed:
+            return {}
+        behind = set(self.queue.open).intersection(*map(self._behind_closed, self.control.drones))
+        whys = {node: one.why for one in self.closed.values() for node in one.nodes}
+        return {node: whys.get(node, _NO_WAY) for node in self.queue.open if node in behind or node in whys}
 
     def _behind_closed(self, drone: str) -> set[str]:
         """The nodes that wait, and from which this drone would not come home."""
@@ -396,8 +396,8 @@ class Dispatcher:
         left_ms = self._left_ms(drone)
         budget_ms = int(left_ms / _WITH_SPARE)
         busy = {self.queue.work(node).aisle for node in self.queue.given}
-        behind = self._behind_closed(drone)
-        nodes = self.queue.tour(self._times(course.place, home), budget_ms, busy, most, drone, behind)
+        out = self._behind_closed(drone).union(*(one.nodes for one in self.closed.values()))
+        nodes = self.queue.tour(self._times(course.place, home), budget_ms, busy, most, drone, out)
         ends = (home,)
         while nodes:
             if not self.control.give(drone, [self._stop(node) for node in nodes], ends, now_ms):

@@ -370,13 +370,13 @@ class TrafficControl:
         self.closed.open(name)
 
     def inside(self) -> dict[str, tuple[str, ...]]:
-        """Each drone that may be in air that is closed, or was released into it, and the names of that."""
+        """For each closure, by its name, the drones that may be in its air, or were released into it."""
         zones = self.closed_by()
-        found = {
-            drone: self.closed.within(zones[drone] if course.doubt_m > 0.0 else course.wreck or course.air)
+        airs = {
+            drone: zones[drone] if course.doubt_m > 0.0 else course.wreck or course.air
             for drone, course in self.drones.items()
         }
-        return {drone: names for drone, names in found.items() if names}
+        return self.closed.within(airs)
 
     def is_cut_off(self, drone: str) -> bool:
         """Whether no way leads to its pad but through what is closed."""

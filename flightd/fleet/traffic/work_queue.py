@@ -155,9 +155,9 @@ class WorkQueue:
         drone: str = "",
         without: Collection[str] = (),
     ) -> tuple[str, ...]:
-        """The nodes of one tour of a drone within a budget, `without` some: first the most valuable aisle that nobody flies
-        in, or that has work for this drone alone, from its nearer end on, then what lies nearest.  Empty
-        where nothing fits."""
+        """The nodes of one tour of a drone within a budget, `without` some: first the most valuable aisle
+        that nobody flies in, or that has work for this drone alone, from its nearer end on, then what lies
+        nearest.  Empty where nothing fits."""
         aisles: dict[str, list[NodeWork]] = {}
         for node in self._open:
             if node in without:

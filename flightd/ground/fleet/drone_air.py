@@ -125,6 +125,11 @@ class DroneAir:
         is_sure = holds and self._armed and bool(self.is_believed)
         self.doubt_m = doubt_m if is_sure else max(self.doubt_m, doubt_m)
 
+    @property
+    def here(self) -> frozenset[int]:
+        """The air in which it was seen last, alone."""
+        return frozenset([self.place]).union(() if self._at is None else self._floor.around(self._at))
+
     def give_back(self) -> None:
         """A person says that on the ground it stands on its pad, and in the air it is where it tells."""
         self.is_astray = False

@@ -18,6 +18,7 @@ import msgspec
 from flightd import __version__
 from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import InputError
+from flightd.fleet.traffic.closures import Closure
 from flightd.fleet.traffic.work_queue import KeptWork
 from flightd.ground.fleet.drone_air import KeptAir
 from flightd.ground.mqtt.kept_session import KeptSession
@@ -67,6 +68,20 @@ class KeptFleet:
     utc_s: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class KeptClosure:
+    """What a person closed: who he is, and when, UTC."""
+
+    closure: Closure
+    by: str
+    utc_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class _KeptClosures:
+    closed: tuple[KeptClosure, ...]
+
+
 class FleetMemory:
     """`fleet.db` in `folder`.  Safe from any thread; each change is whole or none.  UnavailableError where
     the disk refuses, InputError for a file that is none of a station's, or cannot be read."""
@@ -84,10 +99,10 @@ class FleetMemory:
         self._newest: object = None
 
     def begin(self, floor: KeptFloor) -> None:
-        """The fleet flies by these maps from now on; nothing of before is left."""
+        """The fleet flies by these maps from now on; nothing of before is left but what people closed."""
         self._newest = None
         with self._database.changed() as kept:
-            kept.execute("DELETE FROM kept")
+            kept.execute("DELETE FROM kept WHERE name IN ('floor', 'fleet')")
             _put(kept, "floor", replace(floor, version=__version__))
 
     def keep(self, drones: Mapping[str, KeptDrone], work: KeptWork, *, waits: bool) -> None:
@@ -99,6 +114,19 @@ class FleetMemory:
             with self._database.changed() as kept:
                 _put(kept, "fleet", KeptFleet(drones, work, utc_s))
             self._newest = newest
+
+    def keep_closures(self, closed: tuple[KeptClosure, ...]) -> None:
+        """These, and no others, are closed."""
+        with self._database.changed() as kept:
+            _put(kept, "closed", _KeptClosures(closed))
+
+    def closures(self) -> tuple[KeptClosure, ...]:
+        """What was closed last, by whatever flightd and for whichever drones."""
+        if not self._database.file.exists():
+            return ()
+        with self._database.opened() as kept:
+            found = _get(kept, "closed", _KeptClosures)
+        return () if found is None else found.closed
 
     def read(self) -> tuple[KeptFloor, KeptFleet] | None:
         """What the station before knew; None where none flew a fleet.  Work that waited too long is told as

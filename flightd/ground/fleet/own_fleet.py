@@ -19,6 +19,8 @@ from flightd.fleet.traffic.work_queue import WorkQueue
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.fleet.base_orders import VERSION
+from flightd.ground.fleet.closed_ways import aisle_closure, closure_between
+from flightd.ground.fleet.closure_book import ClosureBook
 from flightd.ground.fleet.fleet_drone import FleetDrone
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor
 from flightd.ground.fleet.fleet_memory import FleetMemory, KeptDrone, KeptFleet, KeptFloor
@@ -52,6 +54,7 @@ class OwnFleet(VehicleSides):
         memory: FleetMemory | None = None,
     ) -> None:
         self._memory = memory
+        self._closures = ClosureBook(memory, aside)
         self._forgets = False
         """What it should write down cannot be written: told once."""
         self._cell = CellSize(body_m=max(measures.length_m, measures.width_m), upright_m=WHOLE_AIR_M)
@@ -127,6 +130,7 @@ class OwnFleet(VehicleSides):
     async def _control(self) -> None:
         loop = asyncio.get_running_loop()
         try:
+            await self._closures.recall()
             await self._recall()
         finally:
             self._hear_all()
@@ -207,7 +211,10 @@ class OwnFleet(VehicleSides):
 
     async def _begin(self, floor: FleetFloor, drones: Mapping[str, FleetDrone], pace: Pace) -> None:
         self._traffic, self._fleet = None, (floor, drones, pace)
-        made = partial(StationTraffic, floor, drones, pace, self._cell, self._queue, self._keep_in_mind)
+        closed = self._closures
+        made = partial(
+            StationTraffic, floor, drones, pace, self._cell, self._queue, self._keep_in_mind, closed
+        )
         self._traffic, self._trouble = await self._aside(made), ""
 
     @property
@@ -252,17 +259,36 @@ class OwnFleet(VehicleSides):
             each.may_start = True
         self._traffic.ask(nodes, drone)
 
+    async def close(self, by: str, *, aisle: str = "", nodes: Sequence[str] = ()) -> str:
+        """Have nobody fly in an aisle, or between these nodes, until somebody opens that by the name that is
+        returned.  InputError for what is not there, UnavailableError where no drone told its map yet, or it
+        is closed and not written down."""
+        told = (drone.floor for drone in self._drones.values())
+        floor = next((floor for floor in (*self._compared.values(), *told) if floor is not None), None)
+        if floor is None:
+            raise UnavailableError("no drone told its map yet")
+        closure = aisle_closure(floor, aisle) if aisle else closure_between(floor, nodes)
+        await self._closures.close(closure, by)
+        return closure.name
+
+    async def open(self, name: str) -> None:
+        """Have them fly there again.  InputError where nothing is closed by that name."""
+        await self._closures.open(name)
+
     def document(self) -> dict[str, Any]:
         """How it is, as JSON has it."""
         told = {} if self._traffic is None else self._traffic.document()
         asked = () if self._traffic is None else self._traffic.asked
+        held: Mapping[str, str] = told.get("held_back", {})
         work = {
-            "open": [*self._queue.open, *asked],
+            "open": [*(node for node in self._queue.open if node not in held), *asked],
             "given": dict(self._queue.given),
             "done": list(self._queue.done),
-            "not_done": dict(self._queue.reasons),
+            "not_done": {**self._queue.reasons, **held},
         }
-        return {"flies": self._traffic is not None, "trouble": self._trouble, **told, **work}
+        closed = self._closures.document(told.get("inside", {}))
+        flies = {"flies": self._traffic is not None, "trouble": self._trouble}
+        return {**flies, "drones": told.get("drones", {}), **work, "closed": closed}
 
 
 async def stop_all(hub: Hub) -> dict[str, FlightdError | None]:

@@ -13,6 +13,7 @@ from typing import Any, Final, Protocol, TypeAlias, TypeVar
 
 from flightd.core.errors import InputError
 from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.closures import Closure
 from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
 from flightd.fleet.traffic.endurance import Endurance
 from flightd.fleet.traffic.plan import Action
@@ -51,6 +52,7 @@ class _Seen:
     air: Air = (0, frozenset(), 0.0)
     rests_at: int | None = None
     way_home: frozenset[int] = frozenset()
+    here: frozenset[int] = frozenset()
     refused: str = ""
 
 
@@ -74,6 +76,15 @@ class Aside(Protocol):
     def __call__(self, work: Callable[[], _T], /) -> Awaitable[_T]: ...
 
 
+class Closures(Protocol):
+    """What people closed."""
+
+    @property
+    def closures(self) -> Sequence[Closure]:
+        """All of it, now."""
+        ...
+
+
 class StationTraffic:
     """`step` it often.  It takes the drones one by one, where each rests; what the `queue` has given before
     waits again."""
@@ -86,7 +97,10 @@ class StationTraffic:
         cell: CellSize,
         queue: WorkQueue,
         keep: Keep,
+        closures: Closures,
     ) -> None:
+        self._closures = closures
+        self._closed: Sequence[Closure] = ()
         self._keep = keep
         self._floor = floor
         self._drones = drones
@@ -98,6 +112,7 @@ class StationTraffic:
         self._dispatcher = Dispatcher(self._control, self._queue, _ENDURANCE, shares=True)
         self._dwell_ms = int(pace.dwell_s * 1000)
         self._flown: set[str] = set()
+        self._called_back: set[str] = set()
         self._airs: dict[str, Air] = {}
         self._asked: dict[str, NodeWork] = {}
         self._decides = False
@@ -139,9 +154,10 @@ class StationTraffic:
     async def step(self, now_ms: int, aside: Aside) -> None:
         """Once round.  Whatever plans is done `aside`, by how the drones were before; who is not any more as
         he was then is left to the next step."""
+        self._call_back()
         seen = {name: self._see(name, drone) for name, drone in self._drones.items()}
         self._now_ms, is_read = now_ms, now_ms - self._read_ms < _READ_MS
-        self._told, self._decides = self._view.document(self.flown, in_full=is_read), True
+        self._told, self._decides = self._document(in_full=is_read), True
         try:
             decided = await aside(partial(self._decide, seen, now_ms))
         finally:
@@ -150,6 +166,18 @@ class StationTraffic:
         await self._keep_what(decided)
         for name, drone in self._drones.items():
             self._act(name, drone, seen[name], decided, now_ms / 1000)
+
+    def _call_back(self) -> None:
+        """Who was released into what is closed since then is called off as soon as it flies: it ends at its
+        next node, and is flown out of there."""
+        closed, before = self._closures.closures, self._closed
+        self._closed, lanes = closed, self._control.lanes
+        air = lanes.lanes_between(way for one in closed if one not in before for way in one.ways)
+        self._called_back |= {n for n in self._flown if not air.isdisjoint(self._control.drones[n].air)}
+        self._called_back &= self._flown
+        called = {name for name in self._called_back if not self._drones[name].waits}
+        self._called_back -= called
+        self._flown -= called
 
     async def _keep_what(self, decided: _Decided) -> None:
         """Before it is ordered."""
@@ -167,11 +195,12 @@ class StationTraffic:
         if name in self._flown:
             return _Seen(report=drone.report())
         drone.close_air()
-        return _Seen(None, drone.closed_air, drone.rests_at, drone.way_home, refused)
+        return _Seen(None, drone.closed_air, drone.rests_at, drone.way_home, drone.air.here, refused)
 
     def _decide(self, seen: Mapping[str, _Seen], now_ms: int) -> _Decided:
         """Keep others out of the air of those that traffic does not fly until each rests, and fly it on
         then; send on the others."""
+        self._dispatcher.close(self._closed, now_ms)
         holding = {name: one.rests_at for name, one in seen.items() if one.rests_at is not None}
         clear: dict[str, bool] = {}
         back: set[str] = set()
@@ -181,7 +210,7 @@ class StationTraffic:
             if self._airs.get(name) != one.air:
                 self._airs[name] = one.air
                 self._dispatcher.withdraw(name, *one.air, now_ms, one.refused)
-            clear[name] = self._control.is_clear(name, one.way_home)
+            clear[name] = self._control.is_clear(name, one.way_home, one.here)
             pad = self._floor.pad(name)
             if one.rests_at is not None and self._dispatcher.readmit(
                 name, one.rests_at, pad, now_ms, holding
@@ -210,7 +239,14 @@ class StationTraffic:
     def document(self) -> dict[str, Any]:
         """As JSON has it; while a step is decided, as it was before."""
         self._read_ms = self._now_ms
-        return self._told if self._decides else self._view.document(self.flown)
+        return self._told if self._decides else self._document(in_full=True)
+
+    def _document(self, *, in_full: bool) -> dict[str, Any]:
+        return {
+            "drones": self._view.drones(self.flown, in_full=in_full),
+            "inside": self._control.inside(),
+            "held_back": self._dispatcher.held_back(),
+        }
 
     @property
     def asked(self) -> tuple[str, ...]:

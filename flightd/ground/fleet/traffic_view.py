@@ -28,7 +28,7 @@ class _Done:
 
 
 class TrafficView:
-    """`see` it after every step; `document` is as JSON has it, and moves nothing."""
+    """`see` it after every step; `drones` moves nothing."""
 
     def __init__(self, control: TrafficControl, drones: Mapping[str, FleetDrone]) -> None:
         self._control = control
@@ -48,11 +48,11 @@ class TrafficView:
                 begin_ms = now_ms
             self._base[name] = course.done, course.since_ms, tuple(course.base)
 
-    def document(self, flown: frozenset[str], *, in_full: bool = True) -> dict[str, Any]:
-        """`flown` are the drones that traffic flies now.  Times are seconds from the last step; what lies
-        ahead and behind, and closed air, are told `in_full` only."""
+    def drones(self, flown: frozenset[str], *, in_full: bool = True) -> dict[str, Any]:
+        """Each, as JSON has it.  `flown` are those that traffic flies now.  Times are seconds from the last
+        step; what lies ahead and behind, and closed air, are told `in_full` only."""
         closed = self._control.closed_by() if in_full else {}
-        drones = {
+        return {
             name: {
                 **self._now(name, course, is_flown=name in flown),
                 **self._in_time(name, course, in_full=in_full),
@@ -60,7 +60,6 @@ class TrafficView:
             }
             for name, course in self._control.drones.items()
         }
-        return {"drones": drones}
 
     def _now(self, name: str, course: DroneCourse, *, is_flown: bool) -> dict[str, Any]:
         drone = self._drones[name]
@@ -73,6 +72,7 @@ class TrafficView:
             "doubt_m": round(course.doubt_m, 2),
             "waits_for": list(self._control.waits(name)) if is_flown else [],
             "why": "" if is_flown else drone.why,
+            "cut_off": is_flown and self._control.is_cut_off(name),
         }
 
     def _in_time(self, name: str, course: DroneCourse, *, in_full: bool) -> dict[str, Any]:

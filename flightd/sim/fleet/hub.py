@@ -128,6 +128,13 @@ class FleetHub:
         done, doubt_m = self._first[drone] + course.done, self._lost_m.get(drone, course.doubt_m)
         return KeptDrone(course.place, done, doubt_m, tuple(course.base), tuple(course.wreck))
 
+    @property
+    def has_work(self) -> bool:
+        """Whether drones have something to do that nobody closed to them."""
+        return bool(
+            self.queue.given or (self.queue.open and {*self.queue.open} - self.dispatcher.held_back().keys())
+        )
+
     def close(self, closures: Iterable[Closure], now_ms: int) -> None:
         """Keep these closed, and nothing else."""
         self.dispatcher.close(closures, now_ms)

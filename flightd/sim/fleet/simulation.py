@@ -211,7 +211,7 @@ class FleetSimulation:
             steps += 1
             at_s = self.now_s = steps * _STEP_S
             drones = list(self.world.drones.values())
-            self.judge.see(at_s, drones, work_left=bool(self.queue.open or self.queue.given))
+            self.judge.see(at_s, drones, work_left=self._hubs[-1].has_work)
             left = self.queue.open or self.queue.given or closes or self._hub is None
             if not left and not any(self.world.flies(drone) for drone in drones):
                 break

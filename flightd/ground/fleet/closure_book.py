@@ -1,0 +1,86 @@
+"""What people have closed to the station's drones: kept until people open it, whatever becomes of the
+station."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from flightd.core.errors import FlightdError, InputError, UnavailableError
+from flightd.fleet.traffic.closures import Closure
+from flightd.ground.fleet.fleet_memory import FleetMemory, KeptClosure
+from flightd.ground.fleet.station_traffic import Aside
+
+_LOG = logging.getLogger(__name__)
+
+
+class ClosureBook:
+    """`recall` what is kept before anything else."""
+
+    def __init__(
+        self, memory: FleetMemory | None, aside: Aside, utc_s: Callable[[], float] = time.time
+    ) -> None:
+        self._memory = memory
+        self._aside = aside
+        self._utc_s = utc_s
+        self._closed: dict[str, KeptClosure] = {}
+        self._changes = asyncio.Lock()
+        self._is_recalled = False
+
+    @property
+    def closures(self) -> tuple[Closure, ...]:
+        """All that is closed now."""
+        return tuple(one.closure for one in self._closed.values())
+
+    async def recall(self) -> None:
+        """Read what is kept, once."""
+        async with self._changes:
+            if not self._is_recalled and self._memory is not None:
+                try:
+                    kept = await self._aside(self._memory.closures)
+                    self._closed = {one.closure.name: one for one in kept}
+                except FlightdError as err:
+                    _LOG.error("what people closed is not known any more, and open: %s", err)
+            self._is_recalled = True
+
+    async def close(self, closure: Closure, by: str) -> None:
+        """From now on.  UnavailableError where it is closed and cannot be written down."""
+        await self.recall()
+        async with self._changes:
+            self._closed[closure.name] = KeptClosure(closure, by, self._utc_s())
+            await self._keep()
+
+    async def open(self, name: str) -> None:
+        """InputError where nothing is closed by that name, UnavailableError where it is open and cannot be
+        written down."""
+        await self.recall()
+        async with self._changes:
+            if self._closed.pop(name, None) is None:
+                raise InputError(f"nothing is closed that is called {name}")
+            await self._keep()
+
+    async def _keep(self) -> None:
+        if self._memory is None:
+            return
+        try:
+            await self._aside(partial(self._memory.keep_closures, tuple(self._closed.values())))
+        except FlightdError as err:
+            raise UnavailableError(f"it holds until the station ends, for it is not kept: {err}") from err
+
+    def document(self, inside: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
+        """As JSON has it, with the drones that may be `inside` each; None where that is not known."""
+        return [
+            {
+                "name": one.closure.name,
+                "ways": one.closure.ways,
+                "why": one.closure.why,
+                "by": one.by,
+                "utc_s": round(one.utc_s, 1),
+                "inside": inside.get(one.closure.name),
+            }
+            for one in self._closed.values()
+        ]
