@@ -15,7 +15,7 @@ from flightd.ground.schedules.kept import CountAisles, Kept, QuietHours
 from flightd.ground.schedules.schedule_book import ScheduleBook
 from tests.web.chromium import NARROW, hindrances, opened
 from tests.web.paper_station import PaperStation, paper_station
-from tests.web.people_rig import PASSWORD, with_people
+from tests.web.people_rig import PASSWORD, audited, with_people
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -24,6 +24,7 @@ pytest.importorskip("playwright", reason="the tests of the page need playwright:
 from playwright.sync_api import expect
 
 expect.set_options(timeout=20_000.0)
+_CLOSINGS = frozenset({"/api/fleet/close", "/api/fleet/open"})
 
 
 def keep_schedules(folder: Path) -> None:
@@ -111,6 +112,42 @@ def test_a_tour_is_asked_for_a_drone_is_taken_and_given_back_and_all_are_stopped
             link.drone.held = False
         expect(drone(page, "a")).to_contain_text("nothing shows that it stands on its pad")
         assert hindrances(page) == []
+
+
+def test_an_aisle_is_closed_to_the_drones_and_opened_by_a_second_press(
+    browser: Browser, fleet: PaperStation, tmp_path: Path
+) -> None:
+    with opened(browser, f"{fleet.url}/fleet") as page:
+        closed = page.get_by_role("region", name="Closed to drones")
+        expect(closed).to_contain_text("Nothing is closed.")
+        closed.get_by_role("button", name="Close aisle A").press("Enter")
+        expect(closed.get_by_role("listitem")).to_contain_text("aisle A is closed")
+        expect(closed.get_by_role("listitem")).to_contain_text("No drone is in it.")
+        work = page.get_by_role("region", name="Work")
+        work.get_by_label("Node").select_option("A3")
+        press(page, "Add")
+        press(page, "Have 1 node visited")
+        expect(work.get_by_role("listitem").filter(has_text="A3: aisle A is closed")).to_be_visible()
+        assert hindrances(page) == []
+
+        for node in ("B3", "A3"):
+            work.get_by_label("Node").select_option(node)
+            press(page, "Add")
+        closed.get_by_role("button", name="Close what is between the chosen nodes").press("Enter")
+        expect(closed.get_by_role("status")).to_have_text("no way leads between these nodes")
+        press(page, "Open again: A")
+        assert fleet.own is not None
+        assert [one["name"] for one in fleet.own.document()["closed"]] == ["A"], "a slip of the hand"
+        press(page, "Press again: drones fly there (A)")
+        expect(closed).to_contain_text("Nothing is closed.")
+        expect(work.get_by_text("visits")).to_be_visible()
+    lines = audited(tmp_path / "state")
+    acts = [(line["outcome"], line["text"]) for line in lines if line["target"] in _CLOSINGS]
+    assert acts == [
+        ("accepted", "close A; HTTP 200"),
+        ("refused", "close B3 A3; HTTP 400"),
+        ("accepted", "open A; HTTP 200"),
+    ]
 
 
 def test_the_week_is_a_calendar_and_all_fits_a_phone_in_german(browser: Browser, fleet: PaperStation) -> None:

@@ -71,6 +71,8 @@ RULES: Mapping[str, Rule] = {
     "POST /drones/{drone}/manager": _ACTS,
     "GET /api/fleet": _LOOKS,
     "POST /api/fleet/tour": _ACTS,
+    "POST /api/fleet/close": _ACTS,
+    "POST /api/fleet/open": _ACTS,
     "POST /api/fleet/stop": Rule(Role.VIEWER, Line.OWN),  # as STOP to one drone
     "GET /api/stock": _LOOKS,
     "GET /api/stock/places": _LOOKS,

@@ -1,4 +1,5 @@
-"""The station's fleet over HTTP: how it is, what it is to visit, and STOP for every drone."""
+"""The station's fleet over HTTP: how it is, what it is to visit, what is closed to it, and STOP for every
+drone."""
 
 from __future__ import annotations
 
@@ -30,6 +31,19 @@ class AskedTour(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     drone: _Name = ""
 
 
+class AskedClosure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What nobody is to fly: an `aisle`, or the ways between some `nodes`."""
+
+    aisle: _Name = ""
+    nodes: Annotated[list[_Name], Meta(max_length=MOST_NODES)] = []
+
+
+class AskedOpening(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What is to be flown again, by the name that it was closed by."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=4096)]
+
+
 def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access) -> list[BaseRoute]:
     """Without a `fleet` there is STOP alone."""
 
@@ -45,6 +59,20 @@ def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access) -> list[BaseR
         asked = await said(request, AskedTour, "a tour")
         note_act(request, f"visit {' '.join(asked.nodes)} {asked.drone}".rstrip())
         own().ask(asked.nodes, asked.drone)
+        return as_json({})
+
+    async def close(request: Request) -> Response:
+        asked = await said(request, AskedClosure, "what is to be closed")
+        if bool(asked.aisle) is bool(asked.nodes):
+            raise InputError("an aisle is closed, or what is between nodes")
+        note_act(request, f"close {asked.aisle or ' '.join(asked.nodes)}")
+        by = identity_of(request).name
+        return as_json({"name": await own().close(by, aisle=asked.aisle, nodes=asked.nodes)})
+
+    async def open_again(request: Request) -> Response:
+        asked = await said(request, AskedOpening, "what is to be opened")
+        note_act(request, f"open {asked.name}")
+        await own().open(asked.name)
         return as_json({})
 
     async def stop(request: Request) -> Response:
@@ -70,5 +98,7 @@ def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access) -> list[BaseR
         *page("/fleet"),
         Route("/api/fleet", or_refused(show), methods=["GET"]),
         Route("/api/fleet/tour", or_refused(ask), methods=["POST"]),
+        Route("/api/fleet/close", or_refused(close), methods=["POST"]),
+        Route("/api/fleet/open", or_refused(open_again), methods=["POST"]),
         Route("/api/fleet/stop", or_refused(stop), methods=["POST"]),
     ]

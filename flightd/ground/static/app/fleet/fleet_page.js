@@ -4,6 +4,7 @@ import { html, useEffect } from "../html.js";
 import { quoted, say, sayWith } from "../language.js";
 import { state } from "../store.js";
 import { CalendarCard } from "./calendar_card.js";
+import { ClosedCard } from "./closed_card.js";
 import { DronesCard } from "./drones_card.js";
 import { change, fleet, loadFleet } from "./fleet_state.js";
 import { HallMap } from "./hall_map.js";
@@ -38,6 +39,7 @@ export default function FleetPage() {
       <div class="missions-side">
         <${Traffic} told=${told} none=${none} trouble=${trouble} />
         ${names.length > 0 && html`<${DronesCard} marks=${marks} told=${told} hall=${hall} />`}
+        ${told && here.length > 0 && html`<${ClosedCard} told=${told} floor=${here[0].floor} />`}
         ${told?.flies && here.length > 0 && html`<${WorkCard} told=${told} marks=${marks} floor=${here[0].floor} />`}
       </div>
     </div>

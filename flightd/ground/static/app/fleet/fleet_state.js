@@ -13,6 +13,7 @@ const EMPTY = {
   chosen: [], // ids of nodes for a tour
   by: "", // the drone for it; empty: whichever
   asked: null, // what became of the newest tour: {count} or {refused}
+  closing: "", // why what was to be closed or opened was not
   calendar: null, // {kept, from, runs}
   calendarFrom: "", // first day that is shown, as 2026-11-26
   calendarTrouble: "",
@@ -47,12 +48,27 @@ export async function loadFleet() {
   }
 }
 
+const post = (path, asked) =>
+  askJson(`/api/fleet/${path}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(asked), goesOn: true });
+
+export const closeAisle = (aisle) => changeClosed("close", { aisle });
+export const closeBetween = (nodes) => changeClosed("close", { nodes });
+export const openAgain = (name) => changeClosed("open", { name });
+
+async function changeClosed(path, asked) {
+  try {
+    await post(path, asked);
+    change({ closing: "" });
+  } catch (error) {
+    change({ closing: error.message });
+  }
+  loadFleet();
+}
+
 export async function askTour() {
   const { chosen: nodes, by: drone } = fleet();
   try {
-    await askJson("/api/fleet/tour", {
-      method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ nodes, drone }), goesOn: true,
-    });
+    await post("tour", { nodes, drone });
     change({ chosen: [], asked: { count: nodes.length } });
   } catch (error) {
     change({ asked: { refused: error.message } });

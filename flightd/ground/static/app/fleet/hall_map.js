@@ -13,6 +13,7 @@ const MARKS = [
   ["base", english("released to a drone")],
   ["tour", english("still to be visited, by whom")],
   ["shut", english("closed for others")],
+  ["closed", english("closed by a person")],
   ["keep", english("keep out")],
 ];
 const OVER_NEXT = 2; // nodes of its way that are drawn of a drone that no traffic flies
@@ -41,6 +42,7 @@ export function HallMap({ drones, marks, told, mayChoose }) {
           <pattern id="shut" width="14" height="14" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect class="shut-stripe" width="6" height="14" /></pattern>
         </defs>
         ${plan}
+        <${Closed} closed=${told?.closed ?? []} nodes=${nodes} />
         ${seen.map((one) => html`<${Shut} key=${one.name} told=${one.told} nodes=${nodes} />`)}
         ${seen.map((one) => html`<${Released} key=${one.name} ...${one} nodes=${nodes} />`)}
         ${mayChoose
@@ -49,7 +51,7 @@ export function HallMap({ drones, marks, told, mayChoose }) {
         ${seen.map((one) => html`<${Tour} key=${one.name} ...${one} nodes=${nodes} scale=${scale} />`)}
         ${seen.map((one) => html`<${OnMap} key=${one.name} ...${one} scale=${scale} />`)}
       </svg>
-      <div class="map-foot"><${Legend} marks=${told ? MARKS : MARKS.slice(3)} /></div>
+      <div class="map-foot"><${Legend} marks=${told ? MARKS : MARKS.slice(4)} /></div>
       <${Pads} drones=${drones} told=${told} marks=${marks} />
     </section>
   `;
@@ -62,6 +64,11 @@ function Released({ known, floor, told, mark, nodes }) {
   const way = ids.map((id) => nodes.get(id)).filter(Boolean);
   if (!from || !way.length) return null;
   return html`<polyline class=${`base d${mark.kind}`} points=${[from, ...way].map(at).join(" ")} aria-hidden="true" />`;
+}
+
+function Closed({ closed, nodes }) {
+  const ways = closed.flatMap((one) => one.ways).map((ends) => ends.map((id) => nodes.get(id))).filter(([a, b]) => a && b);
+  return html`<g class="closed-ways" aria-hidden="true">${ways.map(([a, b]) => html`<path d=${`M${at(a)}L${at(b)}`} />`)}</g>`;
 }
 
 function Shut({ told, nodes }) {
