@@ -27,6 +27,7 @@ from flightd.ground.browser import Browser
 from flightd.ground.doctor.routes import doctor_routes
 from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.fleet.routes import fleet_routes
+from flightd.ground.fleet.site_facts import SiteFacts
 from flightd.ground.flights.flights import Flights
 from flightd.ground.flights.routes import flight_routes
 from flightd.ground.ground_store.store import GroundStore
@@ -92,6 +93,7 @@ def application(
     None without a folder; `managers` fly drones, too; programs ask the `store`; `own_fleet` takes tours;
     schedules go by the `clock`."""
     orders = Orders(hub.drones, access)
+    facts = SiteFacts(store, folder, others, uploads, clock.utc_ns)
     routes = [
         first_page(),
         WebSocketRoute("/live", partial(_live, hub, orders, people)),
@@ -104,7 +106,7 @@ def application(
         *mission_routes(folder, hub.drones, hub.for_each, others),
         *schedule_routes(folder, clock.utc_ns),
         *manager_routes(managers),
-        *fleet_routes(own_fleet, hub, access),
+        *fleet_routes(own_fleet, hub, access, facts),
         *store_routes(store),
         *guide_routes(),
         *session_routes(access),

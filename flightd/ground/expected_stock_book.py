@@ -123,6 +123,14 @@ class ExpectedStockBook:
             name, who, utc_ns, changed_ns, StockColumns(place, code, quantity, heading=bool(heading))
         )
 
+    def inventories(self) -> tuple[str, ...]:
+        """The stores of which an upload is kept, that of the newest first."""
+        if self._read("expected_stock", "SELECT 1 FROM expected_stock") is None:
+            return ()
+        with self._database.opened() as book:
+            found = book.execute("SELECT store FROM expected_stock ORDER BY utc_ns DESC, store").fetchall()
+        return tuple(store for (store,) in found)
+
     def data(self, store: str) -> bytes | None:
         """What was uploaded, byte by byte; None where nothing is kept any more."""
         row = self._read("expected_stock", "SELECT data FROM expected_stock WHERE store = ?", store)

@@ -18,6 +18,7 @@ from flightd.core.errors import UnavailableError
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.drone_link import Pages
 from flightd.ground.fleet.own_fleet import OwnFleet
+from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.messages import Act
 from flightd.ground.mqtt.managed_drone import OrderRules
 from tests.rigs.event_loops import real
@@ -98,7 +99,13 @@ class PaperStation:
 
 @contextlib.contextmanager
 def paper_station(
-    names: Sequence[str], folder: Path, *, fleet: bool = True, login: bool = False, speed: float = 1.0
+    names: Sequence[str],
+    folder: Path,
+    *,
+    fleet: bool = True,
+    login: bool = False,
+    speed: float = 1.0,
+    store: GroundStore | None = None,
 ) -> Iterator[PaperStation]:
     """It serves meanwhile; `fleet`: it flies its drones itself."""
     station = PaperStation()
@@ -112,7 +119,7 @@ def paper_station(
         drones = [(name, Address("127.0.0.1", 1, 2)) for name in names]
         station.own = own
         async with served(
-            *drones, folder=folder, state=folder / "state", login=login, own_fleet=own
+            *drones, folder=folder, state=folder / "state", login=login, own_fleet=own, store=store
         ) as where:
             station.url = _url(where)
             station.ready.set()

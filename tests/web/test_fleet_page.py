@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, Standing
 from flightd.core.types import Phase
+from flightd.ground.ground_store.batch import Batch, SentLook
+from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.sqlite_engine import SqliteEngine
+from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.schedules.kept import CountAisles, Kept, QuietHours
 from flightd.ground.schedules.schedule_book import ScheduleBook
 from tests.web.chromium import NARROW, hindrances, opened
@@ -45,6 +50,13 @@ def fleet(tmp_path: Path) -> Iterator[PaperStation]:
         yield station
 
 
+def seen(place: str) -> SentLook:
+    """An empty place, counted now."""
+    now_ns, pose = int(datetime.now(UTC).timestamp()) * 10**9, CountPose("A3", 0.0, 0.0, 0.9, 0.0)
+    look = Observation("run", place, now_ns, LocationState.EMPTY, 0.9, (), pose)
+    return SentLook(look, Standing.CONFIRMED)
+
+
 def drone(page: Page, name: str) -> Locator:
     rows = page.get_by_role("region", name="Drones", exact=True).get_by_role("listitem")
     return rows.filter(has=page.get_by_text(name, exact=True))
@@ -69,7 +81,7 @@ def test_a_tour_is_asked_for_a_drone_is_taken_and_given_back_and_all_are_stopped
         page.get_by_role("button", name="Node A3").click()  # by mouse, and on by keyboard
         page.keyboard.press("ArrowRight")
         page.keyboard.press("Space")
-        work = page.get_by_role("region", name="Work")
+        work = page.get_by_role("region", name="Work", exact=True)
         work.get_by_label("Flown by").select_option("a")
         press(page, "Have 2 nodes visited")
         expect(page.get_by_text("2 nodes were asked for.")).to_be_visible()
@@ -123,7 +135,7 @@ def test_an_aisle_is_closed_to_the_drones_and_opened_by_a_second_press(
         closed.get_by_role("button", name="Close aisle A").press("Enter")
         expect(closed.get_by_role("listitem")).to_contain_text("aisle A is closed")
         expect(closed.get_by_role("listitem")).to_contain_text("No drone is in it.")
-        work = page.get_by_role("region", name="Work")
+        work = page.get_by_role("region", name="Work", exact=True)
         work.get_by_label("Node").select_option("A3")
         press(page, "Add")
         press(page, "Have 1 node visited")
@@ -148,6 +160,24 @@ def test_an_aisle_is_closed_to_the_drones_and_opened_by_a_second_press(
         ("refused", "close B3 A3; HTTP 400"),
         ("accepted", "open A; HTTP 200"),
     ]
+
+
+def test_the_most_valuable_nodes_are_asked_for_by_their_number(browser: Browser, tmp_path: Path) -> None:
+    kept = GroundStore(SqliteEngine(tmp_path / "store.db"), FolderEvidence(tmp_path / "evidence"))
+    places = tuple(PlannedLocation(f"P-{node}", node) for node in ("A3", "B3"))
+    with kept as store, paper_station("ab", tmp_path, store=store) as station:
+        store.take(Batch("hall", "a", places, (seen("P-A3"),)))
+        with opened(browser, f"{station.url}/fleet") as page:
+            form = page.get_by_role("region", name="Work by value")
+            form.get_by_label("How many").fill("9")
+            form.get_by_role("button", name="Have it visited").press("Enter")
+            expect(form.get_by_role("status")).to_have_text("9 nodes were asked for.")
+            assert hindrances(page) == []
+        assert station.own is not None
+        told = station.own.document()
+        asked = {*told["open"], *told["given"]}
+        assert len(asked) == 9
+        assert "A3" not in asked, "it alone was counted"
 
 
 def test_the_week_is_a_calendar_and_all_fits_a_phone_in_german(browser: Browser, fleet: PaperStation) -> None:

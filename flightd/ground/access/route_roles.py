@@ -71,6 +71,7 @@ RULES: Mapping[str, Rule] = {
     "POST /drones/{drone}/manager": _ACTS,
     "GET /api/fleet": _LOOKS,
     "POST /api/fleet/tour": _ACTS,
+    "POST /api/fleet/value": _ACTS,
     "POST /api/fleet/close": _ACTS,
     "POST /api/fleet/open": _ACTS,
     "POST /api/fleet/stop": Rule(Role.VIEWER, Line.OWN),  # as STOP to one drone

@@ -15,6 +15,7 @@ from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.types import CommandKind
 from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.valued_work import Worth
 from flightd.fleet.traffic.work_queue import WorkQueue
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.access.roles import Identity, Role
@@ -253,20 +254,41 @@ class OwnFleet(VehicleSides):
         UnavailableError where the fleet does not fly yet."""
         if drone and drone not in self._drones:
             raise InputError(f"no drone of the fleet is called {drone}")
+        self._asked_traffic().ask(nodes, drone)
+
+    def ask_by_value(
+        self, worth: Mapping[str, Worth], nodes: int | None = None, aisles: int | None = None
+    ) -> tuple[str, ...]:
+        """Have the most valuable visited: so many `nodes`, or all of so many `aisles`, or everything; which.
+        UnavailableError where the fleet does not fly yet."""
+        return self._asked_traffic().ask_by_value(worth, nodes, aisles)
+
+    def _asked_traffic(self) -> StationTraffic:
+        """Of which a person asks something: drones may leave the ground for it."""
         if self._traffic is None:
             raise UnavailableError(f"the fleet does not fly: {self._trouble}")
         for each in self._fleet[1].values() if self._fleet is not None else ():
             each.may_start = True
-        self._traffic.ask(nodes, drone)
+        return self._traffic
+
+    @property
+    def site(self) -> str:
+        """The name of the drones' map.  UnavailableError where none has told one yet."""
+        return self._floor.name
+
+    @property
+    def _floor(self) -> FloorStatus:
+        told = (drone.floor for drone in self._drones.values())
+        floor = next((floor for floor in (*self._compared.values(), *told) if floor is not None), None)
+        if floor is None:
+            raise UnavailableError("no drone told its map yet")
+        return floor
 
     async def close(self, by: str, *, aisle: str = "", nodes: Sequence[str] = ()) -> str:
         """Have nobody fly in an aisle, or between these nodes, until somebody opens that by the name that is
         returned.  InputError for what is not there, UnavailableError where no drone told its map yet, or it
         is closed and not written down."""
-        told = (drone.floor for drone in self._drones.values())
-        floor = next((floor for floor in (*self._compared.values(), *told) if floor is not None), None)
-        if floor is None:
-            raise UnavailableError("no drone told its map yet")
+        floor = self._floor
         closure = aisle_closure(floor, aisle) if aisle else closure_between(floor, nodes)
         await self._closures.close(closure, by)
         return closure.name

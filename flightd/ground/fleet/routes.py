@@ -13,9 +13,11 @@ from starlette.routing import BaseRoute, Route
 
 from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.core.planned_flight import MOST_NODES
+from flightd.fleet.traffic.valued_work import worth_of
 from flightd.ground.access.access import Access
 from flightd.ground.access.gate import address_of, identity_of, note_act
 from flightd.ground.fleet.own_fleet import OwnFleet, stop_all
+from flightd.ground.fleet.site_facts import SiteFacts
 from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, or_refused, said
 from flightd.ground.pages import page
@@ -31,6 +33,14 @@ class AskedTour(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     drone: _Name = ""
 
 
+class AskedByValue(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The so many most valuable `nodes`, or all of the so many most valuable `aisles`; neither: everything,
+    the most valuable first."""
+
+    nodes: Annotated[int, Meta(ge=1, le=MOST_NODES)] | None = None
+    aisles: Annotated[int, Meta(ge=1, le=MOST_NODES)] | None = None
+
+
 class AskedClosure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What nobody is to fly: an `aisle`, or the ways between some `nodes`."""
 
@@ -44,8 +54,8 @@ class AskedOpening(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: Annotated[str, Meta(min_length=1, max_length=4096)]
 
 
-def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access) -> list[BaseRoute]:
-    """Without a `fleet` there is STOP alone."""
+def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access, facts: SiteFacts) -> list[BaseRoute]:
+    """Without a `fleet` there is STOP alone; `facts` say what is most valuable."""
 
     def own() -> OwnFleet:
         if fleet is None:
@@ -60,6 +70,13 @@ def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access) -> list[BaseR
         note_act(request, f"visit {' '.join(asked.nodes)} {asked.drone}".rstrip())
         own().ask(asked.nodes, asked.drone)
         return as_json({})
+
+    async def ask_by_value(request: Request) -> Response:
+        asked = await said(request, AskedByValue, "work by value")
+        what = "nodes" if asked.aisles is None else "aisles"
+        note_act(request, f"visit the most valuable: {asked.nodes or asked.aisles or 'all'} {what}")
+        worth = worth_of(await facts.of(own().site))
+        return as_json({"asked": own().ask_by_value(worth, asked.nodes, asked.aisles)})
 
     async def close(request: Request) -> Response:
         asked = await said(request, AskedClosure, "what is to be closed")
@@ -98,6 +115,7 @@ def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access) -> list[BaseR
         *page("/fleet"),
         Route("/api/fleet", or_refused(show), methods=["GET"]),
         Route("/api/fleet/tour", or_refused(ask), methods=["POST"]),
+        Route("/api/fleet/value", or_refused(ask_by_value), methods=["POST"]),
         Route("/api/fleet/close", or_refused(close), methods=["POST"]),
         Route("/api/fleet/open", or_refused(open_again), methods=["POST"]),
         Route("/api/fleet/stop", or_refused(stop), methods=["POST"]),

@@ -6,7 +6,7 @@ flown by somebody else: the air of its way is closed until it rests where traffi
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Protocol, TypeAlias, TypeVar
@@ -18,6 +18,7 @@ from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
 from flightd.fleet.traffic.endurance import Endurance
 from flightd.fleet.traffic.plan import Action
 from flightd.fleet.traffic.traffic_control import TrafficControl
+from flightd.fleet.traffic.valued_work import UNKNOWN, Worth, most_valuable
 from flightd.fleet.traffic.work_queue import NodeWork, Value, WorkQueue
 from flightd.ground.fleet.fleet_drone import FLIGHT_S, RESERVE, FleetDrone
 from flightd.ground.fleet.fleet_floor import HEIGHT_M, FleetFloor
@@ -139,11 +140,31 @@ class StationTraffic:
         lacks."""
         if unknown := [node for node in nodes if node not in self._floor.lanes.column_of]:
             raise InputError(f"no node is called {unknown[0]}")
-        self._asked |= {
-            node.id: NodeWork(node.id, node.aisle, i, (), self._dwell_ms, Value.ASKED, drone=drone)
-            for i, node in enumerate(self._floor.nodes)
-            if node.id in nodes
-        }
+        asked = Worth(Value.ASKED)
+        self._want(work for work in self._work(lambda _: asked, drone) if work.node in nodes)
+
+    def ask_by_value(
+        self, worth: Mapping[str, Worth], nodes: int | None = None, aisles: int | None = None
+    ) -> tuple[str, ...]:
+        """Have the most valuable (`most_valuable`) nodes visited of those that face a shelf, do not wait yet,
+        and are not closed; which."""
+        shelved = {node.id for node in self._floor.nodes if node.levels} or set(self._floor.lanes.column_of)
+        closed = {node for one in self._closures.closures for node in one.nodes}
+        known = {*self._queue.open, *self._queue.given, *self._asked, *closed}
+        work = self._work(lambda node: worth.get(node, UNKNOWN))
+        chosen = most_valuable(
+            [one for one in work if one.node in shelved and one.node not in known], nodes, aisles
+        )
+        self._want(chosen)
+        return tuple(one.node for one in chosen)
+
+    def _work(self, worth: Callable[[str], Worth], drone: str = "") -> Iterator[NodeWork]:
+        for i, node in enumerate(self._floor.nodes):
+            its = worth(node.id)
+            yield NodeWork(node.id, node.aisle, i, (), self._dwell_ms, its.value, its.age_s, drone)
+
+    def _want(self, work: Iterable[NodeWork]) -> None:
+        self._asked |= {one.node: one for one in work}
         if not self._decides:
             self._take_asked()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
@@ -13,10 +13,10 @@ from flightd.core.inventory import LocationState
 from flightd.core.planned_flight import MOST_NODES
 from flightd.core.utc_time import utc_time
 from flightd.fleet.schedule.rolling import NodeCount, run_nodes
-from flightd.ground.ground_store.pages import MOST_ROWS
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.missions.mission_book import MissionBook
 from flightd.ground.schedules.kept import CountAisles, CountMission, Schedule
+from flightd.ground.site_stock import site_stock
 
 _MOST_RUNS = 400
 
@@ -49,7 +49,7 @@ def work_of(
             "all of a site is counted by the ground store, and there is none", remedy="give --store FILE"
         )
     following = [one.at for one in schedule.rule.next_occurrences(now, _MOST_RUNS)]
-    known = _counts(floor, list(_stock(store, schedule.kept.site)))
+    known = _counts(floor, list(site_stock(store, schedule.kept.site)))
     nodes = run_nodes(known, now, timedelta(days=count.within_days), following)
     return Work(nodes[:MOST_NODES])
 
@@ -67,18 +67,6 @@ def _aisle_nodes(floor: FloorStatus, aisles: Sequence[str]) -> tuple[str, ...]:
 def _shelved(floor: FloorStatus) -> Sequence[FloorNode]:
     """The nodes that face a place; all, where the site knows no places."""
     return [node for node in floor.nodes if node.levels] or floor.nodes
-
-
-def _stock(store: GroundStore, site: str) -> Iterator[dict[str, Any]]:
-    """Every place of the site; none where the store does not know it yet."""
-    if site not in {one["site"] for one in store.sites()}:
-        return
-    after = ""
-    while rows := store.stock(site, after):
-        yield from rows
-        if len(rows) < MOST_ROWS:
-            return
-        after = rows[-1]["location"]
 
 
 def _counts(floor: FloorStatus, stock: Sequence[dict[str, Any]]) -> list[NodeCount]:

@@ -11,6 +11,7 @@ import { HallMap } from "./hall_map.js";
 import { StopAll } from "./stop_all.js";
 import { heardOf, marksOf } from "./the_drones.js";
 import { Timeline } from "./timeline.js";
+import { ValueCard } from "./value_card.js";
 import { WorkCard } from "./work_card.js";
 
 const AGAIN_MS = 1000;
@@ -41,6 +42,7 @@ export default function FleetPage() {
         ${names.length > 0 && html`<${DronesCard} marks=${marks} told=${told} hall=${hall} />`}
         ${told && here.length > 0 && html`<${ClosedCard} told=${told} floor=${here[0].floor} />`}
         ${told?.flies && here.length > 0 && html`<${WorkCard} told=${told} marks=${marks} floor=${here[0].floor} />`}
+        ${mayAsk && html`<${ValueCard} />`}
       </div>
     </div>
   `;

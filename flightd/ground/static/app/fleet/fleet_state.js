@@ -13,6 +13,7 @@ const EMPTY = {
   chosen: [], // ids of nodes for a tour
   by: "", // the drone for it; empty: whichever
   asked: null, // what became of the newest tour: {count} or {refused}
+  valued: null, // the same of what was asked for by value
   closing: "", // why what was to be closed or opened was not
   calendar: null, // {kept, from, runs}
   calendarFrom: "", // first day that is shown, as 2026-11-26
@@ -61,6 +62,16 @@ async function changeClosed(path, asked) {
     change({ closing: "" });
   } catch (error) {
     change({ closing: error.message });
+  }
+  loadFleet();
+}
+
+export async function askByValue(asked) {
+  try {
+    const answer = await post("value", asked);
+    change({ valued: { count: answer.asked.length } });
+  } catch (error) {
+    change({ valued: { refused: error.message } });
   }
   loadFleet();
 }

@@ -683,6 +683,8 @@ export default {
   "the station flies no fleet": "die Station fliegt keine Flotte",
   "start it with --fleet": "starten Sie sie mit --fleet",
   "a tour": "eine Tour",
+  "work by value": "Arbeit nach Wert",
+  "how old counts are is in the ground store, and there is none": "wie alt Zählungen sind, steht im Bodenspeicher, und es gibt keinen",
   "no node is called {name}": "kein Knoten heißt {name}",
   "aisle {name} is closed": "Gang {name} ist gesperrt",
   "what is between {names} is closed": "was zwischen {names} ist, ist gesperrt",
