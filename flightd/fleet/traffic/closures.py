@@ -3,6 +3,7 @@ again, and who is in it leaves."""
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
@@ -52,6 +53,25 @@ class ClosedAir:
     def shut_for(self, air: Collection[int]) -> frozenset[int]:
         """What is closed for who may be in this air: every zone but those in which he is."""
         return frozenset().union(*(zone for zone in self.zones if zone.isdisjoint(air)))
+
+    def shut_round_way_out(self, air: Collection[int], start: int, homes: Iterable[int]) -> frozenset[int]:
+        """The same for who leaves: of the zones in which he is he has the shortest way from the vertex
+        `start` to where a way leads to one of `homes`, and no more; all of them where there is none."""
+        shut = self.shut_for(air)
+        goals = frozenset().union(*map(self.leads_to, homes))
+        queue: list[tuple[float, int, tuple[int, ...]]] = [(0.0, start, (start,))]
+        seen: set[int] = set()
+        while queue:
+            metres, here, way = heapq.heappop(queue)
+            if here in goals:
+                return frozenset().union(*self.zones).difference(way)
+            if here in seen:
+                continue
+            seen.add(here)
+            for arc in self._lanes.arcs[here]:
+                if shut.isdisjoint((arc.resource, arc.to)):
+                    heapq.heappush(queue, (metres + arc.length_m, arc.to, (*way, arc.resource, arc.to)))
+        return shut
 
     def within(self, airs: Mapping[str, Collection[int]]) -> dict[str, tuple[str, ...]]:
         """For each zone, by its name, who is in it of those that may be in these airs."""

@@ -219,13 +219,14 @@ class TrafficControl:
     ) -> tuple[str, ...]:
         todo = {drone for drone in todo if not self.drones[drone].failed}
         holding: set[str] = set()
+        at_large: set[str] = set()
         shut, _ = self._shut(())
         for drone in todo:
             course = self.drones[drone]
             course.stops = tuple(stop for stop in course.stops if stop.vertex not in shut)
         while True:
             self.replans += 1
-            fixed = self._fixed(projected, todo - holding, holding)
+            fixed = self._fixed(projected, todo - holding, holding, at_large)
             requests = [self._request(drone, projected, now_ms) for drone in sorted(todo - holding)]
             planned = self._planner.plan(requests, fixed)
             stopless = [drone for drone in planned.without if self.drones[drone].stops]
@@ -235,6 +236,10 @@ class TrafficControl:
                 continue
             if not planned.without:
                 break
+            closed = frozenset().union(*self.closed.zones)
+            if barred := {d for d in planned.without if not closed.isdisjoint(self.drones[d].air)} - at_large:
+                at_large |= barred
+                continue
             if not holding and (pushed := self._pushed(projected, now_ms)):
                 for drone in pushed:
                     self.drones[drone].stops = ()
@@ -252,7 +257,7 @@ class TrafficControl:
             other for course in self.drones.values() for r in course.wreck for other in self.conflicts[r]
         }
         flying = [drone for drone, course in self.drones.items() if not course.failed]
-        shut, inside = self._shut(flying)
+        shut, inside = self._shut(flying, flying)
         drones: list[Pushed] = []
         for drone in flying:
             request = self._request(drone, projected, now_ms)
@@ -267,7 +272,7 @@ class TrafficControl:
         places: set[int] = set()
         for drone in holding:
             course = self.drones[drone]
-            places.update(self.conflicts[course.base[-1].vertex if course.base else course.place])
+            places.update(self.conflicts[_end_of(course)])
         return {
             drone
             for drone, actions in projected.items()
@@ -290,6 +295,7 @@ class TrafficControl:
         projected: Mapping[str, Sequence[Action]],
         without: Collection[str],
         holding: Collection[str],
+        at_large: Collection[str] = (),
     ) -> FixedBookings:
         """What stays as it is while drones `without` are planned anew."""
         taken: list[tuple[str, int, int, int]] = []
@@ -303,18 +309,29 @@ class TrafficControl:
             rest = () if drone in holding else actions[n:]
             taken += [(drone, *each) for each in occupancy(rest, place, since_ms, NEVER)]
             taken += [(drone, resource, 0, NEVER) for resource in course.wreck]
-        return FixedBookings(taken, *self._shut(without))
+        return FixedBookings(taken, *self._shut(without, at_large))
 
-    def _shut(self, drones: Iterable[str]) -> tuple[frozenset[int], dict[str, frozenset[int]]]:
-        """What is closed, and what for those who stand in it."""
-        zones = (*self.closed.zones, *self._avoided.values())
+    def _shut(
+        self, drones: Iterable[str], at_large: Collection[str] = ()
+    ) -> tuple[frozenset[int], dict[str, frozenset[int]]]:
+        """What is closed, and what for those who stand in it: what people closed they leave by the shortest
+        way, those `at_large` by any."""
+        zones = tuple(self._avoided.values())
+        avoided, closed = frozenset().union(*zones), frozenset().union(*self.closed.zones)
         inside: dict[str, frozenset[int]] = {}
         for drone in drones:
-            at = set(self.drones[drone].air)
+            course = self.drones[drone]
+            at = set(course.air)
             others = [zone for zone in zones if at.isdisjoint(zone)]
-            if len(others) < len(zones):
-                inside[drone] = frozenset().union(*others)
-        return frozenset().union(*zones), inside
+            if drone in at_large:
+                shut = self.closed.shut_for(at)
+            elif at.isdisjoint(closed):
+                shut = closed
+            else:
+                shut = self.closed.shut_round_way_out(at, _end_of(course), course.ends)
+            if len(others) < len(zones) or shut != closed:
+                inside[drone] = shut.union(*others)
+        return avoided | closed, inside
 
     def _adopt(self, projected: Mapping[str, Sequence[Action]], plans: Mapping[str, Plan]) -> None:
         for drone, course in self.drones.items():
@@ -428,3 +445,8 @@ class TrafficControl:
 
 def _ends_of(course: DroneCourse) -> tuple[int, ...]:
     return (course.ahead[-1].vertex,) if course.ahead else ()
+
+
+def _end_of(course: DroneCourse) -> int:
+    """The vertex at which its base ends."""
+    return course.base[-1].vertex if course.base else course.place

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from flightd.fleet.traffic.closures import ClosedAir, Closure
 from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
 from flightd.fleet.traffic.endurance import Endurance
@@ -37,6 +39,31 @@ def test_who_is_in_one_closed_way_does_not_leave_through_another_one() -> None:
     floor.run()
     assert floor.at("d0") == "pad P1"
     assert control.inside() == {"near its pad": (), "where it is": ()}
+
+
+@pytest.mark.parametrize(("at", "by"), [("A3", "A2"), ("A4", "A2"), ("A5", "A7"), ("A6", "A7")])
+def test_who_is_in_a_closed_aisle_leaves_by_the_nearer_end_wherever_it_lives(at: str, by: str) -> None:
+    floor = Floor(4)
+    assert floor.give("d0", at)
+    floor.until("d0", at)
+    assert floor.control.close("A", floor.lanes.lanes_between(BY_A), floor.now_ms) == ()
+    way = [floor.lanes.vertices[action.vertex].name for action in floor.control.drones["d0"].ahead]
+    assert by in way
+    assert {"A2", "A7"} - {by} - set(way), "it does not pass the whole aisle"
+    floor.run()
+    assert floor.at("d0") == "pad P1"
+
+
+def test_who_finds_the_nearer_end_taken_leaves_by_the_other_one() -> None:
+    floor = Floor(4)
+    assert floor.control.give("d1", (), [floor.lanes.over("A2")], 0)
+    floor.run()
+    assert floor.control.fail("d1", floor.now_ms) == ()
+    assert floor.give("d0", "A4")
+    floor.until("d0", "A4")
+    assert floor.control.close("A", floor.lanes.lanes_between(BY_A), floor.now_ms) == ()
+    floor.run()
+    assert floor.at("d0") == "pad P1"
 
 
 def test_a_way_home_leads_through_what_is_closed_only_for_who_is_in_it() -> None:
