@@ -388,6 +388,8 @@ class TrafficControl:
 
     def inside(self) -> dict[str, tuple[str, ...]]:
         """For each closure, by its name, the drones that may be in its air, or were released into it."""
+        if not self.closed.zones:
+            return {}
         zones = self.closed_by()
         airs = {
             drone: zones[drone] if course.doubt_m > 0.0 else course.wreck or course.air

@@ -13,7 +13,7 @@ export default {
   "closed for others": "für andere gesperrt",
   "closed by a person": "von Menschen gesperrt",
   "Closed to drones": "Für Drohnen gesperrt",
-  "Nobody flies in, and who is in it leaves. Drones’ own rules do not know of it.": "Niemand fliegt hinein, und wer darin ist, fliegt hinaus. Die eigenen Regeln der Drohnen wissen nichts davon.",
+  "The fleet does not fly in, and leaves it. People’s orders, schedules and drones’ own rules do not heed it.": "Die Flotte fliegt nicht hinein, und fliegt hinaus. Befehle von Menschen, Zeitpläne und die eigenen Regeln der Drohnen achten nicht darauf.",
   "Nothing is closed.": "Nichts ist gesperrt.",
   "Close aisles": "Gänge sperren",
   "Close aisle {aisle}": "Gang {aisle} sperren",
