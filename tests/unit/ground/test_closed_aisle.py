@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
+import os
+import random
 import sqlite3
 from pathlib import Path
 from typing import Any
@@ -22,6 +25,8 @@ from tests.rigs.paper_drones import hall
 from tests.rigs.paper_fleet import PaperFleet, fly, on_way_to, until
 from tests.unit.ground.test_fleet_restart import at_rest, until_done
 
+SEEDS = int(os.environ.get("FLIGHTD_WALKS", "4"))
+_TO_NEXT_NODE_S = 4.0
 _CROSSINGS_M = (2.0, 5.2)
 """Aisle A lies between these, at y = 0."""
 
@@ -136,6 +141,47 @@ def test_it_stays_closed_over_the_end_of_stations_and_who_was_in_it_leaves(tmp_p
         await until_done(fleet, "A3 B3")
 
     fly(go, memory=memory)
+
+
+@pytest.mark.parametrize("seed", range(SEEDS))
+def test_whatever_happens_nobody_enters_what_is_closed_and_all_come_home(tmp_path: Path, seed: int) -> None:
+    rng = random.Random(seed)
+
+    async def go(fleet: PaperFleet) -> None:
+        closed_s = math.inf
+        inside: set[str] = set()
+
+        async def looks() -> None:
+            nonlocal inside
+            while True:
+                now = entered(fleet)
+                if asyncio.get_running_loop().time() - closed_s > _TO_NEXT_NODE_S:
+                    assert now <= inside, "it came in"
+                inside = now
+                await asyncio.sleep(0.1)
+
+        looking = asyncio.ensure_future(looks())
+        fleet.own.ask(["A2", "A3", "A4", "B3", "B4"])
+        for _ in range(4):
+            await asyncio.sleep(rng.uniform(2.0, 20.0))
+            await fleet.own.close("ann", aisle="A")
+            closed_s = asyncio.get_running_loop().time()
+            if rng.random() < 0.5:
+                await asyncio.sleep(rng.uniform(0.0, 10.0))
+                await fleet.kill()
+                await asyncio.sleep(rng.uniform(0.1, 10.0))
+                fleet.start_again()
+            await asyncio.sleep(rng.uniform(20.0, 60.0))
+            assert not looking.done(), looking.result()
+            closed_s = math.inf
+            await fleet.own.open("A")
+        await until_done(fleet, "A2 A3 A4 B3 B4")
+        looking.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await looking
+
+    fleet = fly(go, memory=FleetMemory(tmp_path))
+    assert {drone.truth.z_m for drone in fleet.drones.values()} == {0.0}
 
 
 def test_it_stays_closed_for_another_fleet_and_another_flightd(tmp_path: Path) -> None:
