@@ -69,6 +69,7 @@ class PaperDrone:
         self.on_person: Callable[[], None] = lambda: None
         self.heard = self.sees = True
         self.counts = self.never_starts = False
+        self.battery_frac = 0.9
         self.refuses: dict[CommandKind, FlightdError] = {}
         """Commands that have no effect, and how that shows."""
         self.plan = ""
@@ -266,7 +267,9 @@ class PaperDrone:
         x_m, y_m = self._pad if self._begins_in_air else (self.truth.x_m, self.truth.y_m)
         at = Position(x_m, y_m, 0.0, 0.0, 1.0, 0.02, 0.02) if armed and self.sees else None
         landed = "in_air" if armed else "on_ground"
-        vehicle = VehicleReport("GUIDED", armed, True, landed, 0.0, 0.0, 0.9, 12.0, 0.0, 0.0, "")
+        vehicle = VehicleReport(
+            "GUIDED", armed, True, landed, 0.0, 0.0, self.battery_frac, 12.0, 0.0, 0.0, ""
+        )
         return StatusReport(
             version=1, session=f"{self.name} {self._session}", seq=next(self._seq), stamp_ns=self._now_ns,
             phase=self.phase, reason="", node="", goal=self.way[0] if self.way else "", nodes_done=0,

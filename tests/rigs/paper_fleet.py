@@ -38,8 +38,13 @@ class PaperFleet:
     """Drones, who flies them, and a judge; as much of a hub as they need."""
 
     def __init__(
-        self, sites: Mapping[str, Site], hold_s: float = 20.0, memory: FleetMemory | None = None
+        self,
+        sites: Mapping[str, Site],
+        hold_s: float = 20.0,
+        memory: FleetMemory | None = None,
+        charged_frac: float = 0.0,
     ) -> None:
+        self._charged_frac = charged_frac
         self.written: list[tuple[str, str, str, str]] = []
         self._sites, self._memory = sites, memory
         self._rules = OrderRules(hold_s, lambda *line: self.written.append(line))
@@ -52,7 +57,7 @@ class PaperFleet:
         self.judge = FleetJudge(CellSize(upright_m=100.0), 0.0)
 
     def _station(self) -> OwnFleet:
-        return OwnFleet(self._sites, BODY, self._rules, self.aside, self._memory)
+        return OwnFleet(self._sites, BODY, self._rules, self.aside, self._memory, self._charged_frac)
 
     def _hear(self, drone: str, topic: str, value: Any) -> None:
         self.own.tell(drone, topic, value)
@@ -135,9 +140,11 @@ def fly(
     *,
     counts: bool = False,
     memory: FleetMemory | None = None,
+    charged_frac: float = 0.0,
 ) -> PaperFleet:
     """Do `go` while the fleet flies."""
-    fleet = PaperFleet({name: hall(name) for name in names}, memory=memory)
+    sites = {name: hall(name) for name in names}
+    fleet = PaperFleet(sites, memory=memory, charged_frac=charged_frac)
     for drone in fleet.drones.values():
         drone.counts = counts
 

@@ -146,6 +146,13 @@ def ground(
             help="The station flies the drones itself, together on one floor, as long as no person does.",
         ),
     ] = False,
+    fleet_charged: Annotated[
+        float,
+        typer.Option(
+            metavar="PERCENT",
+            help="A drone of the fleet that stands on a charge pad takes new work from so much battery on.",
+        ),
+    ] = 0.0,
     store: Annotated[
         str | None,
         typer.Option(
@@ -197,6 +204,8 @@ def ground(
         )
     if not 5.0 <= mqtt_hold <= 3600.0:
         raise InputError("expected 5 to 3600 s", key=f"--mqtt-hold {mqtt_hold:g}")
+    if not 0.0 <= fleet_charged <= 100.0:
+        raise InputError("expected 0 to 100 %", key=f"--fleet-charged {fleet_charged:g}")
     if folder is not None and not folder.is_dir():
         what = "is a file, no folder" if folder.exists() else "there is no such folder"
         raise InputError(what, key=f"--folder {folder}")
@@ -212,7 +221,11 @@ def ground(
         at = "" if viewer is None else viewer.url
         hold_s = mqtt_hold if mqtt_orders else None
         link = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones, access, hold_s)
-        own_fleet = _own_fleet(mqtt_body, drones, access, mqtt_hold, state_folder(state)) if fleet else None
+        own_fleet = (
+            _own_fleet(mqtt_body, drones, access, mqtt_hold, state_folder(state), fleet_charged / 100.0)
+            if fleet
+            else None
+        )
         viewers = () if viewer is None else (viewer,)
         hooks = _webhooks(webhook or (), store)
         kept = None if store is None else stack.enter_context(opened(store, evidence))
@@ -298,7 +311,12 @@ def _fleet_link(
 
 
 def _own_fleet(
-    body: str, drones: Sequence[tuple[str, Address]], access: Access, hold_s: float, folder: Path
+    body: str,
+    drones: Sequence[tuple[str, Address]],
+    access: Access,
+    hold_s: float,
+    folder: Path,
+    charged_frac: float,
 ) -> OwnFleet:
     from flightd.ground.fleet.fleet_memory import FleetMemory
     from flightd.ground.fleet.own_fleet import TRAFFIC, OwnFleet
@@ -309,7 +327,9 @@ def _own_fleet(
         access.write_down(TRAFFIC, "", act, drone, outcome=outcome, text=text)
 
     rules, memory = OrderRules(hold_s, write_down), FleetMemory(folder)
-    return OwnFleet([name for name, _ in drones], read_body(body), rules, memory=memory)
+    return OwnFleet(
+        [name for name, _ in drones], read_body(body), rules, memory=memory, charged_frac=charged_frac
+    )
 
 
 def _say_where(foxglove: str, where: Listening) -> None:

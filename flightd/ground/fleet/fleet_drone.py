@@ -60,8 +60,17 @@ class FleetDrone:
     """`look` at it first.  `is_ours` says whether traffic may fly it, `air` where it may be while traffic
     does not."""
 
-    def __init__(self, name: str, drone: ManagedDrone, floor: FleetFloor, uncertainty_m: float) -> None:
+    def __init__(
+        self,
+        name: str,
+        drone: ManagedDrone,
+        floor: FleetFloor,
+        uncertainty_m: float,
+        charged_frac: float = 0.0,
+    ) -> None:
+        """On a pad that charges it takes new work from a battery of `charged_frac` on."""
         self.name = name
+        self._charged_frac = charged_frac
         self.drone = drone
         self._floor = floor
         self._uncertainty_m = uncertainty_m
@@ -139,6 +148,16 @@ class FleetDrone:
         return status is not None and status.phase is Phase.PREFLIGHT and self.drone.is_automatic
 
     @property
+    def charges_to(self) -> float | None:
+        """The charge (0..1) up to which it is filled where it stands before it takes new work; None: it may
+        take some."""
+        vehicle = None if self.drone.status is None else self.drone.status.vehicle
+        if vehicle is None or vehicle.battery_frac is None or not self.waits or self._base:
+            return None
+        is_low = self.pad.charges and vehicle.battery_frac < self._charged_frac
+        return self._charged_frac if is_low else None
+
+    @property
     def stands(self) -> bool:
         """It waits on its pad, and has told where that is."""
         return self.drone.is_heard and self.waits and self.air.rests and self.drone.standing is not None
@@ -169,7 +188,7 @@ class FleetDrone:
             left_s = _FULL_S
         charge = RESERVE + left_s / FLIGHT_S
         ready = status is not None and CommandKind.START in status.possible and standing is not None
-        ready &= self.may_start
+        ready &= self.may_start and self.charges_to is None
         if self.waits and not self._base and not ready:
             charge = 0.0  # nobody sends it anywhere
         self.air.doubt_m = self._doubt_m(status)

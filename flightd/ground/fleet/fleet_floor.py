@@ -31,11 +31,12 @@ _NEAR_M: Final = 0.4
 
 @dataclass(frozen=True, slots=True)
 class OwnPad:
-    """Where a drone stands at first, and comes home to."""
+    """Where a drone stands at first, and comes home to; `charges`: its battery is filled there."""
 
     node: str
     x_m: float
     y_m: float
+    charges: bool
 
 
 def own_pad(drone: str, floor: FloorStatus, stands_on: str) -> OwnPad:
@@ -56,7 +57,7 @@ def own_pad(drone: str, floor: FloorStatus, stands_on: str) -> OwnPad:
     found = next(iter(pads), None)
     if found is None:
         raise InputError(f"{drone} has no pad at {floor.home}")
-    return OwnPad(floor.home, found.x_m, found.y_m)
+    return OwnPad(floor.home, found.x_m, found.y_m, found.charge)
 
 
 class FleetFloor:

@@ -53,7 +53,10 @@ class OwnFleet(VehicleSides):
         rules: OrderRules,
         aside: Aside = asyncio.to_thread,
         memory: FleetMemory | None = None,
+        charged_frac: float = 0.0,
     ) -> None:
+        """Who stands on a pad that charges takes new work from a battery of `charged_frac` on."""
+        self._charged_frac = charged_frac
         self._memory = memory
         self._closures = ClosureBook(memory, aside)
         self._forgets = False
@@ -189,7 +192,7 @@ class OwnFleet(VehicleSides):
 
     def _drones_on(self, floor: FleetFloor) -> dict[str, FleetDrone]:
         return {
-            name: FleetDrone(name, drone, floor, self._cell.uncertainty_m)
+            name: FleetDrone(name, drone, floor, self._cell.uncertainty_m, self._charged_frac)
             for name, drone in self._drones.items()
         }
 

@@ -72,6 +72,7 @@ class TrafficView:
             "doubt_m": round(course.doubt_m, 2),
             "waits_for": list(self._control.waits(name)) if is_flown else [],
             "why": "" if is_flown else drone.why,
+            "charges_to": drone.charges_to if is_flown else None,
             "cut_off": is_flown and self._control.is_cut_off(name),
         }
 

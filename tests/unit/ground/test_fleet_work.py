@@ -145,6 +145,23 @@ def test_a_drone_with_little_left_is_sent_nowhere() -> None:
     fly(go, "a")
 
 
+def test_who_charges_on_his_pad_takes_new_work_once_he_is_charged_and_others_do_it_meanwhile() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        a.battery_frac = 0.79
+        fleet.own.ask(["A2"])
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: fleet.state["done"] == ["A2"] and b.phase is Phase.DONE, 200)
+        assert (a.commands, fleet.state["drones"]["a"]["charges_to"]) == ([], 0.8)
+        a.battery_frac = 0.8
+        await until(lambda: a.phase is Phase.FOLLOW, 60)
+        a.battery_frac = 0.5
+        await until(lambda: fleet.state["done"] == ["A2", "A3"] and a.phase is Phase.DONE, 200)
+        assert fleet.state["drones"]["a"]["charges_to"] is None, "its flight is over"
+
+    fly(go, "ab", charged_frac=0.8)
+
+
 def test_who_has_another_pad_after_a_start_is_flown_once_all_rest_and_round_it_until_then() -> None:
     async def go(fleet: PaperFleet) -> None:
         a, c = fleet.drones["a"], fleet.drones["c"]

@@ -32,6 +32,7 @@ function Row({ name, mark, told, hall }) {
         ${told && html`<p class=${told.flown ? "flown" : "not-flown"}>${told.flown ? say("Flown by the fleet’s traffic") : ["● ", notFlown(told.why)]}</p>`}
         ${told?.waits_for.length > 0 && html`<p>${say("Waits for {names}", { names: told.waits_for.join(", ") })}</p>`}
         ${told?.doubt_m > 0 && html`<p>${say("Its place is doubted.")}</p>`}
+        ${told && told.charges_to !== null && html`<p>${say("Charges: it takes new work from {charge} on.", { charge: percent(told.charges_to) })}</p>`}
         ${told?.cut_off && html`<p class="not-flown">${say("What is closed cuts it off from its pad: it holds.")}</p>`}
         ${told && html`<${ClosedAir} closed=${told.closed} />`}
         ${status && html`<p class="quiet">${chargeWords(status)}</p>`}

@@ -24,6 +24,7 @@ export default {
   "Nobody knows whether a drone is in it.": "Niemand weiß, ob eine Drohne darin ist.",
   "Perhaps still in it: {names}": "Vielleicht noch darin: {names}",
   "No drone is in it.": "Keine Drohne ist darin.",
+  "Charges: it takes new work from {charge} on.": "Lädt: Neue Arbeit nimmt sie ab {charge}.",
   "What is closed cuts it off from its pad: it holds.": "Was gesperrt ist, trennt sie von ihrem Landeplatz: Sie wartet.",
   "{name}, seen here last: {phase}": "{name}, hier zuletzt gesehen: {phase}",
   "Pad {node}:": "Landeplatz {node}:",
