@@ -94,6 +94,8 @@ def _worlds() -> str:
         ("barometer: wanders, rms", "baro_m", 1, "m"),
         ("hover thrust off by up to", "hover_share", 1e2, "%"),
         ("air: gusts, rms", "gust_mps", 1, "m/s"),
+        ("racks: light on each level of a front, from", "darkest_face", 1, "times the usual"),
+        ("racks: light on each level of a front, up to", "lightest_face", 1, "times the usual"),
     )
     lines += [
         f"| {what} | {getattr(usual, name) * factor:g} {unit} | {getattr(rough, name) * factor:g} {unit} |"

@@ -18,6 +18,8 @@ from flightd.sim.floor.misplaced_lines import misplaced
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import WindParams
+from flightd.sim.racks.appearance import RackAppearance
+from flightd.sim.racks.face_light import drawn_light
 from flightd.sim.sensors.instruments import SensorParams
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.site import Site
@@ -71,6 +73,8 @@ class Unknowns:
     baro_wander_m: float = _SENSORS.baro_wander_m
     hover_share: float = 1.0
     gust_rms_mps: float = _GUST_RMS_MPS
+    face_light: tuple[float, float] = (1.0, 1.0)
+    """Between which the light on each level of each rack front is drawn, the usual one being 1."""
 
     def camera(self, configured: SimCamera) -> SimCamera:
         """The down camera as it really is."""
@@ -95,6 +99,12 @@ class Unknowns:
             with suppress(InputError):
                 return misplaced(configured, share * self.map_error_m, seed)
         return configured
+
+    def racks(self, configured: RackAppearance, site: Site, seed: int) -> RackAppearance:
+        """The racks in the light that really falls on them; what was told of it stands."""
+        if self.face_light == (1.0, 1.0) or configured.light:
+            return configured
+        return replace(configured, light=drawn_light(site, self.face_light, seed))
 
     def sensors(self, configured: SensorParams) -> SensorParams:
         """The autopilot's sensors as they really are."""
@@ -161,6 +171,8 @@ class Spread:
     baro_m: float
     hover_share: float
     gust_mps: float
+    darkest_face: float
+    lightest_face: float
 
 
 SPREADS = {
@@ -189,6 +201,8 @@ SPREADS = {
         baro_m=0.1,
         hover_share=0.10,
         gust_mps=_GUST_RMS_MPS,
+        darkest_face=0.75,
+        lightest_face=1.05,
     ),
     WorldKind.ROUGH: Spread(
         delay_s=0.050,
@@ -215,6 +229,8 @@ SPREADS = {
         baro_m=0.4,
         hover_share=0.25,
         gust_mps=0.5,
+        darkest_face=0.35,
+        lightest_face=1.8,
     ),
 }
 
@@ -255,6 +271,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         yaw_drift_radps=math.radians(most.yaw_drift_degps),
         readout_s=within(most.readout_s),
         gust_rms_mps=most.gust_mps,
+        face_light=(most.darkest_face, most.lightest_face),
     )
 
 

@@ -250,7 +250,8 @@ def _down_camera(
 def _front_camera(
     spec: WorldSpec, front: FrontSpec, vehicle: VehiclePeer, clock: Clock, hold: Hold
 ) -> CameraPeer:
-    make = partial(FrontRenderer, spec.site, front.camera, front.appearance, spec.seed)
+    look = spec.unknowns.racks(front.appearance, spec.site, spec.seed)
+    make = partial(FrontRenderer, spec.site, front.camera, look, spec.seed)
     seed, name, truth_at = f"front camera {spec.seed}", "front camera", vehicle.truth_at
     return CameraPeer(front.camera, make, seed, front.address, truth_at, clock, hold=hold, name=name)
 

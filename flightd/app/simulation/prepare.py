@@ -14,6 +14,7 @@ from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.sim.external.external_simulator import truth_address
 from flightd.sim.plant.plant_kind import PlantKind
+from flightd.sim.racks.face_light import check_names
 from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.unknowns import WorldKind, unknowns_of
 
@@ -73,6 +74,7 @@ def prepare(
         truth_address(options.truth_url)
     if factor is None:
         _say_what_is_off(config, say)
+    check_names(scenario.racks.light, site)
     check_faults(scenario.fault, config, site, external=bool(options.truth_url))
     _make_folder(folder, going_on=bool(config.inventory.run))
     order = going_on(configured_order(config), config.inventory.run, site, folder)

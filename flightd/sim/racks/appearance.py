@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from flightd.sim.racks.stock import StockShares
@@ -13,7 +14,8 @@ class RackAppearance:
     goods, the flight's own when None; `location_labels` hangs a small label with each location's code on the
     beam below it.  `noise` is the standard deviation in grey
     levels at mid grey, `soft_px` the sigma of the lens blur, `exposure` scales the brightness, `flicker`
-    is the share of it that beats with the mains."""
+    is the share of it that beats with the mains; `light` is a factor on it by rack front ("A left") or by a
+    level of one ("A left 2")."""
 
     shares: StockShares = field(default_factory=StockShares)
     seed: int | None = None
@@ -25,3 +27,4 @@ class RackAppearance:
     flicker: float = 0.01
     in_part: float = 0.0
     motion_blur: bool = True
+    light: Mapping[str, float] = field(default_factory=dict)

@@ -18,6 +18,7 @@ from flightd.core.types import Image
 from flightd.sim.appearance import Appearance
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
+from flightd.sim.racks.face_light import USUAL_LIGHT, FaceLight
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.panels import Pane
 from flightd.sim.racks.rack_layout import faces
@@ -62,6 +63,7 @@ class FrontRenderer:
 
         self._racks = make_racks(faces(site), places, density, stock_seed)
         self._look = look
+        self._light = FaceLight(look.light, camera.lens)
         self._sensor = Sensor(camera.lens, _sensor_look(look), seed + 1)
         self._ideal, self._bend = _ideal_lens(camera.lens)
         self._drawn = np.empty((self._ideal.height_px, self._ideal.width_px, 4), np.uint8)
@@ -88,7 +90,8 @@ class FrontRenderer:
             drawn = np.asarray(cv2.remap(drawn, *self._bend, cv2.INTER_LINEAR), np.uint8)
         cv2.cvtColor(drawn, cv2.COLOR_BGRA2BGR, dst=picture)
         self._blur(picture, kinematics, _distance_m(view, seen), exposure)
-        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure)
+        light = self._light.draw(view, seen)
+        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure, light, USUAL_LIGHT)
         return picture
 
     def _background(self, view: Viewpoint) -> Image:

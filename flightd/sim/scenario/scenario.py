@@ -88,6 +88,7 @@ from flightd.site.site import Site
 
 _Shift = Annotated[float, Field(ge=-2, le=2, allow_inf_nan=False)]
 _Carried = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+_Light = Annotated[float, Field(ge=0.05, le=4, allow_inf_nan=False)]
 
 
 class CameraScenario(Section):
@@ -154,6 +155,7 @@ class RacksScenario(Section):
     seed: int | None = Field(None, ge=0)
     noise: float = Field(2.0, ge=0, le=20)
     exposure: float = Field(1.0, gt=0, le=3)
+    light: dict[str, _Light] = {}
 
     @model_validator(mode="after")
     def _shares_leave_room(self) -> Self:
@@ -171,6 +173,7 @@ class RacksScenario(Section):
             noise=self.noise,
             exposure=self.exposure,
             in_part=self.in_part,
+            light=self.light,
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -11,6 +12,8 @@ from flightd.core.geometry import Lens
 from flightd.core.types import Image
 from flightd.sim.appearance import Appearance
 from flightd.sim.sensors.optics import Floats
+
+Levels: TypeAlias = "np.ndarray[Any, np.dtype[np.unsignedinteger[Any]]]"
 
 _MIDDLE = 128
 """A gain of one in the sensor's tables."""
@@ -54,16 +57,29 @@ class Sensor:
                 np.clip(-steps, 0, 255).astype(np.uint8),
             )
 
-    def expose(self, picture: Image, stamp_ns: int, seq: int, part: float = 1.0) -> None:
-        """Turn an ideal picture into one taken with a part of the usual exposure, in place."""
+    def expose(
+        self,
+        picture: Image,
+        stamp_ns: int,
+        seq: int,
+        part: float = 1.0,
+        light: Image | None = None,
+        usual_light: float = 1.0,
+    ) -> None:
+        """Turn an ideal picture into one taken with a part of the usual exposure, in place.  `light` is that
+        on each of its pixels, (H, W, 3), where it is not `usual_light` all over."""
         draw = np.random.default_rng([self._seed, seq]) if self._bank is not None else None
         beat = math.sin(math.tau * ((stamp_ns * 1e-9 * _MAINS_HZ) % 1.0))
         exposure = part * self._look.exposure * (1.0 + self._look.flicker * beat)
+        lit: Levels = picture
+        if light is not None:  # in 16 bits: what is too light may be exposed for less
+            lit = cv2.multiply(picture, light, dtype=cv2.CV_16U)
+            exposure /= usual_light
         if self._gains:
             table = self._gains[int(draw.integers(len(self._gains))) if draw is not None else 0]
-            cv2.multiply(picture, table, dst=picture, scale=exposure / _MIDDLE)
+            cv2.multiply(lit, table, dst=picture, scale=exposure / _MIDDLE, dtype=cv2.CV_8U)
         elif exposure != 1.0:
-            cv2.convertScaleAbs(picture, dst=picture, alpha=exposure)
+            cv2.convertScaleAbs(lit, dst=picture, alpha=exposure)
         if self._bank is not None and draw is not None:
             row, column = (int(v) for v in draw.integers(_BANK_MARGIN, size=2))
             cut = (slice(row, row + picture.shape[0]), slice(column, column + picture.shape[1]))
