@@ -107,8 +107,8 @@ class Pilot:
         return self._mission.plan
 
     @property
-    def exposure(self) -> float:
-        """What the front camera's pictures are wanted with, as a part of its usual exposure."""
+    def exposure(self) -> tuple[float, float]:
+        """What the front camera's pictures are wanted with, as parts of its usual exposure and gain."""
         return self._scanner.exposure
 
     def places(self, stamp_ns: int) -> tuple[Place, ...]:

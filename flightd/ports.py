@@ -94,10 +94,10 @@ class Camera(Protocol):
         """Pictures that came and were not delivered: out of order, old, or of no known time."""
         ...
 
-    def expose(self, part: float) -> None:
-        """From now on, take pictures of this part of the usual exposure (1.0: the usual one again).  Never
-        blocks.  Each ticket tells the exposure that its picture was taken with: a camera that cannot go by
-        this leaves it at 1.0."""
+    def expose(self, part: float, gain: float) -> None:
+        """From now on, take pictures of these parts of the usual exposure and gain (1.0: the usual one again).
+        Never blocks.  Each ticket tells what its picture was taken with: a camera that cannot go by this
+        leaves it at 1.0."""
         ...
 
     async def run(self) -> None: ...

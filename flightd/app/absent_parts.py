@@ -94,7 +94,7 @@ class NoCamera:
     frames = 0
     refused = 0
 
-    def expose(self, part: float) -> None:
+    def expose(self, part: float, gain: float) -> None:
         pass
 
     async def run(self) -> None:

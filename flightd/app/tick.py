@@ -93,7 +93,7 @@ class Tick:
             call("detection", flight.vision.not_flying, None)
         call("pose output", lambda: flight.share_pose(output.shared), None)
         call("count", lambda: flight.counting.keep(output), None)
-        call("front camera", lambda: flight.front_camera.expose(flight.pilot.exposure), None)
+        call("front camera", lambda: flight.front_camera.expose(*flight.pilot.exposure), None)
         call("progress", self._keep, None)
 
     def _keep(self) -> None:

@@ -38,6 +38,14 @@ class SweepConfig(Section):
         description="exposure that the light allows against the usual one; shorter ones let it fly faster",
         json_schema_extra=unit("share"),
     )
+    most_gain: float = Field(
+        2.5,
+        ge=1,
+        le=16,
+        description="gain of a dark rack front against the usual one, at most; what it cannot make up for is "
+        "flown past more slowly",
+        json_schema_extra=unit("factor"),
+    )
     read_s: float = Field(
         0.25,
         gt=0.005,

@@ -83,8 +83,9 @@ class PlaceLook:
 
 @dataclass(frozen=True, slots=True)
 class CodeSet:
-    """What the code reader saw in one picture of the front camera, taken with `exposure` as a part of the
-    camera's usual one.  `timings_ms` by stage."""
+    """What the code reader saw in one picture of the front camera, taken with `exposure` and `gain` as parts
+    of the camera's usual ones.  `timings_ms` by stage; `white` is the grey level, 0..255, that white paper
+    has in it, None where nobody looked."""
 
     frame_seq: int
     stamp_ns: int
@@ -94,6 +95,8 @@ class CodeSet:
     places: tuple[PlaceLook, ...]
     timings_ms: dict[str, float] = field(default_factory=dict)
     exposure: float = 1.0
+    gain: float = 1.0
+    white: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -440,7 +440,7 @@ class Mission:
 
     def _pass_by(self, s: MissionInputs) -> None:
         """What is flown past is decided, and its nodes are visited."""
-        self._scan.step(s.now_ns)
+        self._scan.step(s, self.goal)
         known = s.localised and s.is_sure(self._params)
         if self.phase is Phase.FOLLOW and known and s.pose is not None and not self.state.returning:
             self._route.note_passed(s.now_ns, s.pose)
@@ -497,4 +497,5 @@ class Mission:
         along_x = leads_along_x(self.goal, self._steering.anchor)
         cruise = self.state.returning or not self.goal.visit or not along_x
         view = self._scan.view(self.phase)
-        return ReferenceTask(self.state, self._progress.phase_s(now_ns), self.goal, view, cruise)
+        goal = self._scan.paced(self.goal)
+        return ReferenceTask(self.state, self._progress.phase_s(now_ns), goal, view, cruise)

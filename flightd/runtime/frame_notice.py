@@ -15,8 +15,8 @@ _T = TypeVar("_T")
 
 
 class FrameNotice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """`device_ns` is mid-exposure in the camera's own clock, `exposure` the part of the camera's usual one
-    that the frame was taken with; the rest says where the frame is."""
+    """`device_ns` is mid-exposure in the camera's own clock, `exposure` and `gain` the parts of the camera's
+    usual ones that the frame was taken with; the rest says where the frame is."""
 
     ring: str
     slots: int
@@ -26,13 +26,16 @@ class FrameNotice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     width_px: int
     height_px: int
     exposure: float = 1.0
+    gain: float = 1.0
     version: int = VERSION
 
 
 class ExposureRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The daemon's answer to notices of another exposure than it wants: this part of the usual one."""
+    """The daemon's answer to notices of another exposure or gain than it wants: these parts of the usual
+    ones."""
 
     exposure: float
+    gain: float = 1.0
     version: int = VERSION
 
 
@@ -50,8 +53,8 @@ def decode_notice(datagram: bytes) -> FrameNotice:
     notice = _decoded(_DECODER, datagram, "a frame notice")
     if notice.version != VERSION:
         raise InputError(f"frame notice of version {notice.version}, this is version {VERSION}")
-    if not _is_part(notice.exposure):
-        raise InputError(f"not a frame notice: exposure {notice.exposure}")
+    if not (_is_part(notice.exposure) and _is_part(notice.gain)):
+        raise InputError(f"not a frame notice: exposure {notice.exposure}, gain {notice.gain}")
     return notice
 
 
@@ -62,8 +65,9 @@ def encode_request(request: ExposureRequest) -> bytes:
 def decode_request(datagram: bytes) -> ExposureRequest:
     """Raises InputError for anything that is not a request of this version."""
     request = _decoded(_REQUESTS, datagram, "an exposure request")
-    if request.version != VERSION or not _is_part(request.exposure):
-        raise InputError(f"not an exposure request: version {request.version}, {request.exposure}")
+    if request.version != VERSION or not (_is_part(request.exposure) and _is_part(request.gain)):
+        told = f"version {request.version}, exposure {request.exposure}, gain {request.gain}"
+        raise InputError(f"not an exposure request: {told}")
     return request
 
 
@@ -74,5 +78,5 @@ def _decoded(decoder: msgspec.json.Decoder[_T], datagram: bytes, what: str) -> _
         raise InputError(f"not {what}: {err}") from err
 
 
-def _is_part(exposure: float) -> bool:
-    return math.isfinite(exposure) and exposure > 0.0
+def _is_part(value: float) -> bool:
+    return math.isfinite(value) and value > 0.0

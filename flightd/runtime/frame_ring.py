@@ -30,7 +30,7 @@ class FrameTicket:
     """Where a frame lies and when it was taken: all that the daemon's own process handles of it.
 
     `stamp_ns` is mid-exposure, `arrival_ns` the time at which it could first be read, both in the
-    daemon's clock; `exposure` the part of the camera's usual one that the frame was taken with.
+    daemon's clock; `exposure` and `gain` the parts of the camera's usual ones that it was taken with.
     """
 
     ring: str
@@ -42,6 +42,7 @@ class FrameTicket:
     width_px: int
     height_px: int
     exposure: float = 1.0
+    gain: float = 1.0
 
 
 class FrameRing:

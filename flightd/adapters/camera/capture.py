@@ -43,7 +43,7 @@ class CaptureCamera:
         self._on_trouble = on_trouble
         self._order = FrameOrder(self._name, self._latency_ns, on_trouble)
         self._without_time = self._without_time_before = 0
-        self._exposure = 1.0
+        self._wanted = 1.0, 1.0
         self._process: LinkedProcess | None = None
         self._asked = False
         self._mismatches: tuple[ExposureMismatch, ...] = ()
@@ -65,11 +65,11 @@ class CaptureCamera:
         """As it was read back last; None while nothing was."""
         return self._state
 
-    def expose(self, part: float) -> None:
-        """Ask the device for frames of this part of its usual exposure; streams and recordings are as they
-        are."""
-        if part != self._exposure:
-            self._exposure = part
+    def expose(self, part: float, gain: float) -> None:
+        """Ask the device for frames of these parts of its usual exposure and gain; streams and recordings are
+        as they are."""
+        if (part, gain) != self._wanted:
+            self._wanted = part, gain
             self._ask()
 
     async def run(self) -> None:
@@ -98,7 +98,7 @@ class CaptureCamera:
         process = LinkedProcess(capture, arguments, take, lambda _: end("the capture process died"))
         self._process, self._asked = process, not source.order.is_empty
         try:
-            if self._exposure != 1.0:
+            if self._wanted != (1.0, 1.0):
                 self._ask()
             raise TransientError(f"camera {self._name}: {await over}")
         finally:
@@ -133,7 +133,7 @@ class CaptureCamera:
     def _ask(self) -> None:
         if self._process is not None and self._source.kind.is_told:
             self._asked = True
-            self._process.send(self._exposure)
+            self._process.send(self._wanted)
 
     def _deliver(self, ring: FrameRing, frame: Captured) -> None:
         now_ns = self._clock.now_ns()
@@ -156,6 +156,7 @@ class CaptureCamera:
                     ring.width_px,
                     ring.height_px,
                     frame.exposure,
+                    frame.gain,
                 )
             )
 

@@ -51,6 +51,7 @@ class Captured:
     stamp_ns: int
     arrival_ns: int
     exposure: float
+    gain: float
     refused: int
 
 
@@ -103,7 +104,8 @@ def _reason_of_end(parent: ChildEnd, source: Source, ring: FrameRing, latency_ns
             slot = ring.begin(seq)
             np.copyto(ring.pixels(slot), frame.bgr)
             ring.publish(slot, seq, stamp_ns)
-            parent.send(Captured(slot, seq, stamp_ns, frame.arrival_ns, frame.exposure, refused))
+            how = frame.exposure, frame.gain
+            parent.send(Captured(slot, seq, stamp_ns, frame.arrival_ns, *how, refused))
     return reason
 
 
@@ -163,7 +165,8 @@ def _of_device(source: Source, parent: ChildEnd) -> Iterator[Grabbed]:
                 yield Grabbed(frame.bgr, frame.arrival_ns, frame.device_ns, part)
                 held.look(exposure.is_usual)
                 while parent.has_news():
-                    exposure.ask(parent.receive())
+                    part, _ = parent.receive()  # a driver's gain is a number of its own, and of no known scale
+                    exposure.ask(part)
         finally:
             exposure.give_back()
             held.give_back()

@@ -107,38 +107,39 @@ def frames_of_picamera(source: Source, camera: Picamera, parent: ChildEnd) -> It
                 bgr, told = np.asarray(request.make_array("main"), np.uint8), request.get_metadata()
             finally:
                 request.release()
-            part, state = exposure.of(told)
+            part, gain, state = exposure.of(told)
             if state is not None:
                 parent.send(state)
-            yield Grabbed(bgr, arrival_ns, told.get("SensorTimestamp"), part)
+            yield Grabbed(bgr, arrival_ns, told.get("SensorTimestamp"), part, gain)
             while parent.has_news():
-                exposure.ask(parent.receive())
+                exposure.ask(*parent.receive())
     finally:
         camera.close()
 
 
 class PicameraExposure:
-    """Asks for parts of the usual exposure, and says by a frame's metadata which it has."""
+    """Asks for parts of the usual exposure and gain, and says by a frame's metadata which it has."""
 
     def __init__(self, camera: Picamera, held: Mapping[str, Any]) -> None:
         self._camera = camera
         self._held = held
         self._usual_s: float | None = None
         self._gain: float | None = None
-        self._part = 1.0
+        self._part = self._gain_part = 1.0
         self._is_usual = True
         self._mixed = _LATE_FRAMES
         self._told: ExposureState | None = None
 
-    def ask(self, part: float) -> None:
-        """Take frames with this part of the usual exposure from now on; 1.0 gives the usual one back."""
+    def ask(self, part: float, gain_part: float) -> None:
+        """Take frames with these parts of the usual exposure and gain from now on; 1.0 of both gives the usual
+        ones back."""
         if self._usual_s is None:
             return
         self._mixed = _LATE_FRAMES
-        if part != 1.0:
-            self._part = part
+        if (part, gain_part) != (1.0, 1.0):
+            self._part, self._gain_part = part, gain_part
             asked = {"AeEnable": False, "ExposureTime": round(part * self._usual_s / _US)}
-            gain = {} if self._gain is None else {"AnalogueGain": self._gain}
+            gain = {} if self._gain is None else {"AnalogueGain": gain_part * self._gain}
             self._camera.set_controls(asked | gain)
             self._is_usual = False
             return
@@ -146,15 +147,17 @@ class PicameraExposure:
         by_hand = {name: value for name, value in self._held.items() if name in _BY_HAND}
         self._camera.set_controls(by_hand or {"AeEnable": True})
 
-    def of(self, metadata: Mapping[str, Any]) -> tuple[float, ExposureState | None]:
-        """The part of the usual exposure that a frame has; the state, where it is another than was told."""
+    def of(self, metadata: Mapping[str, Any]) -> tuple[float, float, ExposureState | None]:
+        """The parts of the usual exposure and gain that a frame has; the state, where it is another than was
+        told."""
         microseconds, gain = metadata.get("ExposureTime"), metadata.get("AnalogueGain")
         exposure_s = None if microseconds is None else microseconds * _US
         if self._mixed:
             self._mixed -= 1
         if self._mixed or not self._is_usual:
-            return self._part_of(exposure_s), None
-        self._usual_s, self._gain, self._part = exposure_s, gain, 1.0
+            part = _nearly(exposure_s, self._usual_s, self._part)
+            return part, _nearly(gain, self._gain, self._gain_part), None
+        self._usual_s, self._gain, self._part, self._gain_part = exposure_s, gain, 1.0, 1.0
         mains_us = self._held.get("AeFlickerPeriod")
         state = ExposureState(
             is_manual="ExposureTime" in self._held,
@@ -163,15 +166,16 @@ class PicameraExposure:
             anti_flicker_hz=0 if mains_us is None else round(0.5e6 / mains_us),
         )
         if self._told is not None and not _differs(state, self._told):
-            return 1.0, None
+            return 1.0, 1.0, None
         self._told = state
-        return 1.0, state
+        return 1.0, 1.0, state
 
-    def _part_of(self, exposure_s: float | None) -> float:
-        if exposure_s is None or self._usual_s is None:
-            return 1.0
-        found = exposure_s / self._usual_s
-        return self._part if abs(found - self._part) <= _NEAR * self._part else 1.0
+
+def _nearly(value: float | None, usual: float | None, asked: float) -> float:
+    """The asked part of the usual value, where the frame has about that."""
+    if value is None or usual is None or not usual > 0.0:
+        return 1.0
+    return asked if abs(value / usual - asked) <= _NEAR * asked else 1.0
 
 
 def _differs(one: ExposureState, other: ExposureState) -> bool:

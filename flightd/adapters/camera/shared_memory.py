@@ -52,7 +52,7 @@ class SharedCamera(asyncio.DatagramProtocol):
         self._order = FrameOrder(url, latency_ns, on_trouble)
         self._on_frame = on_frame
         self.frames = 0
-        self._exposure = 1.0
+        self._wanted = ExposureRequest(1.0)
         self._transport: asyncio.DatagramTransport | None = None
 
     @property
@@ -76,9 +76,9 @@ class SharedCamera(asyncio.DatagramProtocol):
             self._transport = None
             transport.close()
 
-    def expose(self, part: float) -> None:
-        """Ask for frames of this part of the usual exposure from now on."""
-        self._exposure = part
+    def expose(self, part: float, gain: float) -> None:
+        """Ask for frames of these parts of the usual exposure and gain from now on."""
+        self._wanted = ExposureRequest(part, gain)
 
     def datagram_received(self, data: bytes, addr: Any) -> None:
         arrival_ns = self._clock.now_ns()
@@ -93,8 +93,9 @@ class SharedCamera(asyncio.DatagramProtocol):
             self._order.refuse(reason, arrival_ns)
             return
         line = self._transport
-        if notice.exposure != self._exposure and line is not None and not is_stalled(line):
-            line.sendto(encode_request(ExposureRequest(self._exposure)), addr)
+        other = (notice.exposure, notice.gain) != (self._wanted.exposure, self._wanted.gain)
+        if other and line is not None and not is_stalled(line):
+            line.sendto(encode_request(self._wanted), addr)
         stamp_ns = self._device.to_ours(notice.device_ns, arrival_ns)
         if stamp_ns is None:
             self._order.refuse(OUT_OF_ORDER, arrival_ns)
@@ -113,5 +114,6 @@ class SharedCamera(asyncio.DatagramProtocol):
                 notice.width_px,
                 notice.height_px,
                 notice.exposure,
+                notice.gain,
             )
         )

@@ -58,7 +58,8 @@ def read_frame(bgr: Image, ticket: FrameTicket, wanted: Wanted) -> Reading:
     shown = _shown(bgr) if wanted.shown else b""
     if not wanted.places:
         return Reading(None, {}, shown)
-    codes, evidence = read_shelf(bgr, ticket.seq, ticket.stamp_ns, wanted.places, ticket.exposure)
+    how = ticket.exposure, ticket.gain
+    codes, evidence = read_shelf(bgr, ticket.seq, ticket.stamp_ns, wanted.places, *how)
     return Reading(codes, evidence, shown)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
@@ -21,7 +22,7 @@ class NoScan:
     least_integrity = 0.0
     look_s = 0.0
     view = None
-    exposure = 1.0
+    exposure = 1.0, 1.0
     blind = None
     doubted = False
     looking = False
@@ -82,8 +83,12 @@ class NoScan:
     def pause_leg(self) -> None:
         """Nothing is interrupted."""
 
-    def step_sweep(self, now_ns: int) -> None:
+    def step_sweep(self, now_ns: int, leg: SweepLeg | None, flown_mps: float) -> None:
         """Nothing is decided."""
+
+    @property
+    def passing_mps(self) -> float:
+        return math.inf
 
     def end_sweep(self, now_ns: int) -> None:
         """Nothing ends."""

@@ -37,6 +37,7 @@ class ScanTask:
         self._open: dict[str, LocationVotes] = {
             code: LocationVotes(code, node, params.pictures) for view in views for code in view.locations
         }
+        self._usual = [view.exposure for view in views]
         self._begun_ns: int | None = None
         self._relit = False
         self._followed = self._unfollowed = 0
@@ -107,6 +108,7 @@ class ScanTask:
             self._settle(code, final=True)
             self._open.pop(code, None)
         self._views.pop(0)
+        self._usual.pop(0)
         return True
 
     def _again(self, view: View, left: Sequence[str]) -> View | None:
@@ -114,13 +116,17 @@ class ScanTask:
         lights = {code: self._open[code].light for code in left}
         if view.exposure != 1.0 and self._unfollowed and not self._followed:
             self.relights = False
+            self._usual = [1.0] * len(self._views)
+            self._views = [replace(one, exposure=1.0) for one in self._views]
+            if not self._relit:  # nothing was looked at yet
+                return self._views[0]
         if self.relights and not self._relit:
             relit = self._planner.relit(view, lights)
             self._relit = relit is not None
             if relit is not None:
                 return relit
         if not (self.relights and Light.FAIR in lights.values()):
-            view = replace(view, exposure=1.0)
+            view = replace(view, exposure=self._usual[0])
         return self._planner.retake(view, left)
 
     def drain(self) -> tuple[Finding, ...]:

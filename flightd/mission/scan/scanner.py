@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 
 from flightd.config.scan import ScanConfig
 from flightd.core.planned_flight import PlannedSweep
@@ -20,6 +21,7 @@ from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, ShelfLook, Sighting
 from flightd.mission.scan.code_identity import names_one_thing
+from flightd.mission.scan.face_light import USUAL, Face, FaceLight, LegLight
 from flightd.mission.scan.label_checks import LabelChecks
 from flightd.mission.scan.node_scan import ScanTask
 from flightd.mission.scan.pending_findings import PendingFindings
@@ -48,12 +50,15 @@ class Scanner:
         optics: SweepOptics | None = None,
     ) -> None:
         self._params = params
+        self._site = site
         self._assigner = Assigner(site, sight, params.expert.least_probability)
         self._planner = ViewPlanner(site, sight, self._assigner, params, highest_m, aside_per_height)
         self._sweeps: SweepPlanner | None = None
         if optics is not None:
             self._sweeps = SweepPlanner(site, self._planner, self._assigner, optics)
         self._sweep: SweepTask | None = None
+        self._light = FaceLight(params.expert.darker, params.expert.brighter, params.sweep.most_gain)
+        self._shot = USUAL
         self._swept: set[str] = set()
         self._shared_of: tuple[str, frozenset[str], Pace] | None = None
         self._shared_s: dict[str, float] = {}
@@ -97,11 +102,11 @@ class Scanner:
         return self._task.view if self._task else None
 
     @property
-    def exposure(self) -> float:
-        """What the front camera's pictures are wanted with, as a part of its usual exposure."""
+    def exposure(self) -> tuple[float, float]:
+        """What the front camera's pictures are wanted with, as parts of its usual exposure and gain."""
         if self._passing is not None:
-            return self._passing.exposure
-        return self.view.exposure if self.view is not None else 1.0
+            return self._shot.exposure, self._shot.gain
+        return self.view.exposure if self.view is not None else 1.0, 1.0
 
     @property
     def blind(self) -> NothingRead | None:
@@ -155,7 +160,7 @@ class Scanner:
     def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
         """Begin or continue the scan of a node that is reached."""
         self.leave()
-        views = self._planner.views(node, self._left(node), height_m, yaw_rad)
+        views = [self._lit(view) for view in self._planner.views(node, self._left(node), height_m, yaw_rad)]
         self._task = ScanTask(node, views, self._planner, self._params, self._relights)
         self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
         self._pending.arrive(node)
@@ -168,12 +173,23 @@ class Scanner:
     def step(self, now_ns: int) -> bool:
         """True when the view is over; `view` is then the next one."""
         over = self._task is None or self._task.step(now_ns)
-        if self._task is not None and self._relights and not self._task.relights:
-            self._relights = False
-            text = "the front camera does not support exposure control: what is lit wrongly stays unreadable"
-            self._events.append(Event(now_ns, EventLevel.WARNING, "exposure_fixed", text))
+        if self._task is not None and not self._task.relights:
+            self._fix_exposure(now_ns)
         self._gather()
         return over
+
+    def _fix_exposure(self, now_ns: int) -> None:
+        """The front camera has shown that it is exposed as it is."""
+        if self._relights:
+            self._relights = False
+            self._light.fix()
+            text = "the front camera does not support exposure control: what is lit wrongly stays unreadable"
+            self._events.append(Event(now_ns, EventLevel.WARNING, "exposure_fixed", text))
+
+    def _lit(self, view: View) -> View:
+        """With the exposure that was right when its rack front was flown past."""
+        part = self._light.part({self._face(code) for code in view.locations})
+        return replace(view, exposure=part)
 
     def leave(self) -> None:
         """The node is left; what was not decided there stays to count."""
@@ -268,9 +284,18 @@ class Scanner:
         if self._sweep is not None:
             self._sweep.pause()
 
-    def step_sweep(self, now_ns: int) -> None:
-        """Decide what has been flown past by now."""
+    @property
+    def passing_mps(self) -> float:
+        """No faster may be flown past a shelf for want of light; infinite where nothing is."""
+        return self._shot.speed_mps if self._passing is not None else math.inf
+
+    def step_sweep(self, now_ns: int, leg: SweepLeg | None, flown_mps: float) -> None:
+        """Decide what has been flown past by now, and how `leg` is to be taken at the speed `flown_mps`."""
         if self._sweep is not None:
+            if leg is not None:
+                self._shot = self._light.shot(_faces(leg), self._leg_light(leg), flown_mps)
+            if not self._light.follows:
+                self._fix_exposure(now_ns)
             self._sweep.step(now_ns)
             self._gather_sweep()
 
@@ -285,6 +310,14 @@ class Scanner:
         text = f"{why.total()} places to stop before" + (f": {left}" if left else "")
         self._events.append(Event(now_ns, EventLevel.INFO, "swept", text))
         self._sweep = None
+
+    def _leg_light(self, leg: SweepLeg) -> LegLight:
+        assert self._sweeps is not None
+        return LegLight(leg.speed_mps, leg.exposure, self._sweeps.sharp_mps)
+
+    def _face(self, code: str) -> Face:
+        place = self._site.locations[code]
+        return place.aisle, place.side, place.level
 
     # What pictures bring
 
@@ -319,6 +352,8 @@ class Scanner:
             leg = passing.leg_at(pose)
             if leg is None:
                 return
+            taken = codes.exposure, codes.gain
+            self._light.take(_faces(leg), self._shot, taken, codes.white, leg.exposure)
             look = self._assigner.look(codes, pose, (leg.aisle, leg.side))
             agreeing = self._proven(look, f"aisle {leg.aisle}")
             if agreeing is not None:
@@ -435,6 +470,10 @@ class Scanner:
             share_s = self._sweeps.seconds(legs, pace, 0.0) / max(len(counted), 1)
             self._shared_of, self._shared_s = of_aisle, dict.fromkeys(counted, share_s)
         return self._shared_s.get(node, 0.0)
+
+
+def _faces(leg: SweepLeg) -> list[Face]:
+    return [(leg.aisle, leg.side, level) for level in leg.levels]
 
 
 def nodes_to_count(site: Site, nodes: Iterable[str], counted: Collection[str]) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from flightd.core.types import Event, Phase
@@ -83,10 +84,16 @@ class ShelfScan:
         self._sweeping = True
         return legs
 
-    def step(self, now_ns: int) -> None:
-        """Decide what has been flown past by now."""
+    def step(self, s: MissionInputs, stop: Stop) -> None:
+        """Decide what has been flown past by now on the way to `stop`, and look at what is being flown past."""
         if self._sweeping:
-            self._scanner.step_sweep(now_ns)
+            self._scanner.step_sweep(s.now_ns, stop.sweep, s.speed_mps)
+
+    def paced(self, stop: Stop) -> Stop:
+        """What is flown past on the way to it flown past as slowly as its light asks for."""
+        if stop.sweep is None or not self._scanner.passing_mps < stop.speed_mps:
+            return stop
+        return replace(stop, sweep=replace(stop.sweep, speed_mps=self._scanner.passing_mps))
 
     def end_sweep(self, now_ns: int) -> None:
         """What was not decided in passing is counted by stopping."""

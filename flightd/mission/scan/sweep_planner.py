@@ -108,6 +108,11 @@ class SweepPlanner:
         self._assigner = assigner
         self._optics = optics
 
+    @property
+    def sharp_mps(self) -> float:
+        """The speed at which a picture of the usual exposure is blurred by as much as it may be."""
+        return self._optics.view.speed_limit_mps()
+
     def lanes(self, aisle: str, wanted: Iterable[str]) -> list[Lane]:
         """What is flown past in an aisle to see the `wanted` locations, side by side and from the lowest
         level up; also what cannot be, with why."""

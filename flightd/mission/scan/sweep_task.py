@@ -51,8 +51,6 @@ class SweepTask:
         self._apart: set[tuple[str, str, str]] = set()
         self._glimpsed: dict[str, int] = {}
         self._since_ns: int | None = None
-        self.exposure = legs[0].exposure
-        """What pictures are wanted with, as a part of the camera's usual exposure."""
         self.undecided: dict[str, Undecided] = {}
         """Places that were flown past and not decided, and why."""
 

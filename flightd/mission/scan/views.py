@@ -96,11 +96,12 @@ class ViewPlanner:
 
     def relit(self, view: View, left: Mapping[str, Light]) -> View | None:
         """The same place with another exposure, if something of what is `left` comes out so dark or so light
-        that its code may be lost; None if nothing does, or this is such a view already."""
+        that its code may be lost; None if nothing does, or the exposure cannot be another."""
         p = self._params
         for light, part in ((Light.DIM, p.expert.brighter), (Light.BURNT, p.expert.darker)):
-            if view.exposure == 1.0 and light in left.values():
-                return replace(view, locations=tuple(left), exposure=part)
+            exposure = min(max(view.exposure * part, p.expert.darker), p.expert.brighter)
+            if light in left.values() and exposure != view.exposure:
+                return replace(view, locations=tuple(left), exposure=exposure)
         return None
 
     def retake(self, view: View, left: Sequence[str]) -> View | None:

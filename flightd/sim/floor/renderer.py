@@ -67,10 +67,15 @@ class Renderer:
         self._sensor = Sensor(camera.lens, appearance, seed)
 
     def render(
-        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+        self,
+        kinematics: Kinematics,
+        seq: int,
+        out: Image | None = None,
+        exposure: float = 1.0,
+        gain: float = 1.0,
     ) -> Image:
         """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise,
-        `exposure` is its part of the camera's usual one.
+        `exposure` and `gain` are its parts of the camera's usual ones.
 
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
         picture = picture_for(self._camera.lens, out)
@@ -85,7 +90,7 @@ class Renderer:
         self._smear(picture, kinematics, exposure)
         self._shine(picture, view, x_m, y_m)
         self._shade(picture, kinematics, view, x_m, y_m)
-        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure)
+        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure, gain)
         self._tiles.prepare(x_m, y_m, foot, footprint_m, _ahead(kinematics, view))
         return picture
 

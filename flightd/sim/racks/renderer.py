@@ -72,10 +72,15 @@ class FrontRenderer:
         )
 
     def render(
-        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+        self,
+        kinematics: Kinematics,
+        seq: int,
+        out: Image | None = None,
+        exposure: float = 1.0,
+        gain: float = 1.0,
     ) -> Image:
         """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise,
-        `exposure` is its part of the camera's usual one.
+        `exposure` and `gain` are its parts of the camera's usual ones.
 
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
         picture = picture_for(self._camera.lens, out)
@@ -91,7 +96,7 @@ class FrontRenderer:
         cv2.cvtColor(drawn, cv2.COLOR_BGRA2BGR, dst=picture)
         self._blur(picture, kinematics, _distance_m(view, seen), exposure)
         light = self._light.draw(view, seen)
-        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure, light, USUAL_LIGHT)
+        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure, gain, light, USUAL_LIGHT)
         return picture
 
     def _background(self, view: Viewpoint) -> Image:

@@ -155,7 +155,7 @@ class RacksScenario(Section):
     seed: int | None = Field(None, ge=0)
     noise: float = Field(2.0, ge=0, le=20)
     exposure: float = Field(1.0, gt=0, le=3)
-    light: dict[str, _Light] = {}
+    light: dict[str, _Light] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _shares_leave_room(self) -> Self:

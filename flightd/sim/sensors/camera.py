@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import cv2
 
@@ -30,8 +30,8 @@ from flightd.runtime.frame_ring import FrameRing
 from flightd.sim.plant.kinematics import Kinematics
 
 _SPARE_SLOTS = 8
-_EXPOSURES = (0.05, 8.0)
-"""Parts of its usual exposure that a camera is able to."""
+_EXPOSURES, _GAINS = (0.05, 8.0), (0.25, 8.0)
+"""Parts of its usual exposure and gain that a camera is able to."""
 _CLOCK_OFFSET_NS = 7_300_000_000_000
 
 
@@ -52,15 +52,24 @@ class Optics(Protocol):
 
 
 class PictureMaker(Protocol):
-    """Renders one camera's pictures, each with a part of the camera's usual exposure."""
+    """Renders one camera's pictures, each with a part of the camera's usual exposure, and of its gain."""
 
     def render(
-        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+        self,
+        kinematics: Kinematics,
+        seq: int,
+        out: Image | None = None,
+        exposure: float = 1.0,
+        gain: float = 1.0,
     ) -> Image: ...
 
 
+_How: TypeAlias = tuple[float, float]
+"""Parts of the usual exposure and gain."""
+
+
 class _RenderWorker:
-    """Inside the process: answers (kinematics, seq, slot, exposure) by rendering into the ring, with an empty
+    """Inside the process: answers (kinematics, seq, slot, how) by rendering into the ring, with an empty
     text; from the first error on with that, in words."""
 
     def __init__(self, make: Callable[[], PictureMaker], camera: Optics, ring: str) -> None:
@@ -68,15 +77,15 @@ class _RenderWorker:
         self._make = make
         self._problem = _problem_of(self._begin)
 
-    def __call__(self, request: tuple[Kinematics, int, int, float]) -> str:
+    def __call__(self, request: tuple[Kinematics, int, int, _How]) -> str:
         self._problem = self._problem or _problem_of(partial(self._render, *request))
         return self._problem
 
     def _begin(self) -> None:
         self._renderer = self._make()
 
-    def _render(self, kinematics: Kinematics, seq: int, slot: int, exposure: float) -> None:
-        self._renderer.render(kinematics, seq, self._ring.pixels(slot), exposure)
+    def _render(self, kinematics: Kinematics, seq: int, slot: int, how: _How) -> None:
+        self._renderer.render(kinematics, seq, self._ring.pixels(slot), *how)
 
 
 def _problem_of(act: Callable[[], None]) -> str:
@@ -109,12 +118,13 @@ class CameraTrouble:
 class _Requests(asyncio.DatagramProtocol):
     """What the daemon asks of a camera; anything else is dropped."""
 
-    def __init__(self, expose: Callable[[float], None]) -> None:
+    def __init__(self, expose: Callable[[float, float], None]) -> None:
         self._expose = expose
 
     def datagram_received(self, data: bytes, addr: Any) -> None:  # noqa: ARG002 - asyncio names it
         with contextlib.suppress(InputError):
-            self._expose(min(max(decode_request(data).exposure, _EXPOSURES[0]), _EXPOSURES[1]))
+            wanted = decode_request(data)
+            self._expose(_within(wanted.exposure, _EXPOSURES), _within(wanted.gain, _GAINS))
 
 
 class CameraPeer:
@@ -154,7 +164,7 @@ class CameraPeer:
         self._turn = asyncio.Lock()
         self.late = 0
         """Pictures that the machine was too slow to take."""
-        self._exposure = 1.0
+        self._how = 1.0, 1.0
         self.trouble = CameraTrouble()
         self._kept: Image | None = None
         self._newest = 0
@@ -179,8 +189,8 @@ class CameraPeer:
             transport.close()
             self._ring.close()
 
-    def _expose_with(self, part: float) -> None:
-        self._exposure = part
+    def _expose_with(self, part: float, gain: float) -> None:
+        self._how = part, gain
 
     async def _expose(self, child: Child, transport: Any, pictures: asyncio.TaskGroup) -> None:
         """Take a picture each period; each is rendered and delivered by a task of its own."""
@@ -203,16 +213,16 @@ class CameraPeer:
                 straggles = seq % self.trouble.straggler_every == 0
                 late_s = self.trouble.late_s + (self.trouble.straggler_s if straggles else 0.0)
                 due_ns += round(late_s * 1e9)
-                pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, self._exposure))
+                pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, self._how))
             seq += 1
 
     async def _deliver(
-        self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int, exposure: float
+        self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int, how: _How
     ) -> None:
         early_s = self._camera.capture_delay_s + self._camera.jitter_s
         # a late picture is drawn late: the ring holds no more than the usual delay's
         await asyncio.sleep(max((due_ns - self._clock.now_ns()) * 1e-9 - early_s, 0.0))
-        rendering = asyncio.ensure_future(self._render(child, truth, seq, exposure, due_ns + self._period_ns))
+        rendering = asyncio.ensure_future(self._render(child, truth, seq, how, due_ns + self._period_ns))
         try:
             await asyncio.sleep((due_ns - self._clock.now_ns()) * 1e-9)
             with self._hold():
@@ -234,13 +244,11 @@ class CameraPeer:
             truth.stamp_ns + _CLOCK_OFFSET_NS,
             lens.width_px,
             lens.height_px,
-            exposure,
+            *how,
         )
         transport.sendto(encode_notice(notice))
 
-    async def _render(
-        self, child: Child, truth: Kinematics, seq: int, exposure: float, latest_ns: int
-    ) -> int:
+    async def _render(self, child: Child, truth: Kinematics, seq: int, how: _How, latest_ns: int) -> int:
         """The slot of the picture.  TransientError when its turn did not come until `latest_ns`, RunError
         when it cannot be drawn at all."""
         async with self._turn:
@@ -248,7 +256,7 @@ class CameraPeer:
                 raise TransientError(f"picture {seq}: the renderer is behind")
             slot = self._ring.begin(seq)
             try:
-                problem = await child.ask((truth, seq, slot, exposure))
+                problem = await child.ask((truth, seq, slot, how))
             except TransientError as err:
                 problem = str(err)
             if problem:
@@ -275,6 +283,10 @@ class CameraPeer:
             turn = cv2.getRotationMatrix2D(middle, -trouble.turn_deg, 1.0)
             size = lens.width_px, lens.height_px
             picture[:] = cv2.warpAffine(picture, turn, size, borderMode=cv2.BORDER_REPLICATE)
+
+
+def _within(part: float, able: tuple[float, float]) -> float:
+    return min(max(part, able[0]), able[1])
 
 
 def _slots(camera: Optics) -> int:

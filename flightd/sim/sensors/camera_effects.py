@@ -13,7 +13,7 @@ from flightd.core.types import Image
 from flightd.sim.appearance import Appearance
 from flightd.sim.sensors.optics import Floats
 
-Levels: TypeAlias = "np.ndarray[Any, np.dtype[np.unsignedinteger[Any]]]"
+Levels: TypeAlias = np.ndarray[Any, np.dtype[np.uint8 | np.uint16]]
 
 _MIDDLE = 128
 """A gain of one in the sensor's tables."""
@@ -63,17 +63,18 @@ class Sensor:
         stamp_ns: int,
         seq: int,
         part: float = 1.0,
+        gain: float = 1.0,
         light: Image | None = None,
         usual_light: float = 1.0,
     ) -> None:
-        """Turn an ideal picture into one taken with a part of the usual exposure, in place.  `light` is that
+        """Turn an ideal picture into one taken with parts of the usual exposure and gain, in place.  `light` is that
         on each of its pixels, (H, W, 3), where it is not `usual_light` all over."""
         draw = np.random.default_rng([self._seed, seq]) if self._bank is not None else None
         beat = math.sin(math.tau * ((stamp_ns * 1e-9 * _MAINS_HZ) % 1.0))
-        exposure = part * self._look.exposure * (1.0 + self._look.flicker * beat)
+        exposure = part * gain * self._look.exposure * (1.0 + self._look.flicker * beat)
         lit: Levels = picture
         if light is not None:  # in 16 bits: what is too light may be exposed for less
-            lit = cv2.multiply(picture, light, dtype=cv2.CV_16U)
+            lit = np.asarray(cv2.multiply(picture, light, dtype=cv2.CV_16U), np.uint16)
             exposure /= usual_light
         if self._gains:
             table = self._gains[int(draw.integers(len(self._gains))) if draw is not None else 0]
@@ -83,11 +84,16 @@ class Sensor:
         if self._bank is not None and draw is not None:
             row, column = (int(v) for v in draw.integers(_BANK_MARGIN, size=2))
             cut = (slice(row, row + picture.shape[0]), slice(column, column + picture.shape[1]))
-            cv2.add(picture, self._bank[0][cut], dst=picture)
-            cv2.subtract(picture, self._bank[1][cut], dst=picture)
+            more, less = (noise[cut] if gain == 1.0 else _louder(noise[cut], gain) for noise in self._bank)
+            cv2.add(picture, more, dst=picture)
+            cv2.subtract(picture, less, dst=picture)
 
 
 _BANK_MARGIN = 64
+
+
+def _louder(noise: Image, gain: float) -> Image:
+    return np.asarray(cv2.convertScaleAbs(noise, alpha=gain), np.uint8)
 
 
 def _vignette(lens: Lens, depth: float) -> Floats:

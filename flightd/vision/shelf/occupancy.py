@@ -11,6 +11,7 @@ case is `UNSURE`: an empty place is never guessed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -23,6 +24,8 @@ _SAMPLES = 96
 """Longer side at which a core is looked at: a few millimetres to the pixel."""
 _SMALLEST_PX = 12
 _WHITE_SHARE = 99.5
+_LABEL_SHARE = 85.0
+"""So much of a code is ink, or less light than most of its paper."""
 _LEAST_WHITE = 110.0
 """A picture without anything lighter has no paper in it, and white is not known."""
 _BURNT, _BURNT_PART = 250, 0.001
@@ -54,6 +57,16 @@ def white_level(picture: Image) -> float:
     grey = cv2.cvtColor(np.ascontiguousarray(picture[::4, ::4]), cv2.COLOR_BGR2GRAY)
     white = float(np.percentile(grey, _WHITE_SHARE))
     return white if white >= _LEAST_WHITE else float("nan")
+
+
+def paper_level(picture: Image, codes: Sequence[Image]) -> float:
+    """The grey level of white paper in a picture, (H, W, 3) BGR: that of the labels, where these show their
+    `codes`, else of the lightest that there is."""
+    labels = [float(np.percentile(cv2.cvtColor(code, cv2.COLOR_BGR2GRAY), _LABEL_SHARE)) for code in codes]
+    if labels:
+        return float(np.median(labels))
+    grey = cv2.cvtColor(np.ascontiguousarray(picture[::4, ::4]), cv2.COLOR_BGR2GRAY)
+    return float(np.percentile(grey, _WHITE_SHARE))
 
 
 def light_on(cell: Image, white: float) -> Light:

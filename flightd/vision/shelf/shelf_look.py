@@ -16,7 +16,7 @@ from flightd.vision.shelf import empty_deck as deck
 from flightd.vision.shelf.code_reader import read_codes
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg, picture_name
 from flightd.vision.shelf.fill_level import OpeningLook, fill_level
-from flightd.vision.shelf.occupancy import judge, light_on, white_level
+from flightd.vision.shelf.occupancy import judge, light_on, paper_level, white_level
 from flightd.vision.shelf.opening_raster import onto_opening
 
 Box: TypeAlias = tuple[int, int, int, int]
@@ -27,7 +27,12 @@ _MARGIN = 0.1
 
 
 def read_shelf(
-    bgr: Image, seq: int, stamp_ns: int, places: Sequence[Place], exposure: float = 1.0
+    bgr: Image,
+    seq: int,
+    stamp_ns: int,
+    places: Sequence[Place],
+    exposure: float = 1.0,
+    gain: float = 1.0,
 ) -> tuple[CodeSet, dict[str, bytes]]:
     """The codes and the places of one picture, (H, W, 3) BGR; the evidence of each place by its name.
 
@@ -36,7 +41,7 @@ def read_shelf(
     height, width = bgr.shape[:2]
     box = _around(places, width, height)
     started = cv2.getTickCount()
-    reads = _shifted(read_codes(np.ascontiguousarray(bgr[box[1] : box[3], box[0] : box[2]])), box, bgr)
+    reads = _shifted(read_codes(_cut(bgr, box)), box, bgr)
     read = cv2.getTickCount()
     white = white_level(bgr)
     looks, kept = [], {}
@@ -47,7 +52,16 @@ def read_shelf(
             kept[look.evidence] = jpeg
     per_ms = cv2.getTickFrequency() * 1e-3
     timings = {"codes": (read - started) / per_ms, "places": (cv2.getTickCount() - read) / per_ms}
-    return CodeSet(seq, stamp_ns, width, height, reads, tuple(looks), timings, exposure), kept
+    labels = [_cut(bgr, _box(read.corners_px, width, height)) for read in reads]
+    paper = paper_level(_cut(bgr, box), [label for label in labels if label.size])
+    how = timings, exposure, gain, round(paper, 1)
+    return CodeSet(seq, stamp_ns, width, height, reads, tuple(looks), *how), kept
+
+
+def _cut(bgr: Image, box: Box) -> Image:
+    """What is within a box."""
+    x0, y0, x1, y1 = box
+    return np.ascontiguousarray(bgr[y0:y1, x0:x1])
 
 
 def _around(places: Sequence[Place], width: int, height: int) -> Box:

@@ -70,7 +70,7 @@ def taken(
         await asyncio.sleep(0)
         running = asyncio.ensure_future(peer.run())
         for part in expose or (1.0,):
-            listener.expose(part)
+            listener.expose(part, 1.0)
             await asyncio.sleep(for_s / max(len(expose), 1))
         for task in (running, listening):
             task.cancel()
@@ -106,7 +106,12 @@ class Broken:
     """Draws two pictures."""
 
     def render(
-        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+        self,
+        kinematics: Kinematics,
+        seq: int,
+        out: Image | None = None,
+        exposure: float = 1.0,
+        gain: float = 1.0,
     ) -> Image:
         if seq == 2:
             raise ValueError("a picture\nof nothing")
@@ -121,7 +126,12 @@ class Dying:
         os._exit(3)
 
     def render(
-        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+        self,
+        kinematics: Kinematics,
+        seq: int,
+        out: Image | None = None,
+        exposure: float = 1.0,
+        gain: float = 1.0,
     ) -> Image:
         raise AssertionError
 
@@ -151,7 +161,12 @@ class Slow:
     """Takes half as long again over a picture as the camera has for one."""
 
     def render(
-        self, kinematics: Kinematics, seq: int, out: Image | None = None, exposure: float = 1.0
+        self,
+        kinematics: Kinematics,
+        seq: int,
+        out: Image | None = None,
+        exposure: float = 1.0,
+        gain: float = 1.0,
     ) -> Image:
         until_s = time.monotonic() + 1.5 / CAMERA.fps
         while time.monotonic() < until_s:

@@ -88,7 +88,7 @@ def test_a_device_is_left_with_the_exposure_that_it_was_found_with(
     with ours, theirs, closing(frames_of(source, ChildEnd(theirs))) as frames:
         next(frames)
         before = dict(device.values)
-        ChildEnd(ours).send(0.4)
+        ChildEnd(ours).send((0.4, 1.0))
         assert [next(frames).exposure for _ in range(9)][-1] == 0.4
         assert device.values != before
         end(ours, frames)

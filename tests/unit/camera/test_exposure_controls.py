@@ -229,7 +229,7 @@ class Pi:
         self.controls: Mapping[str, Any] = {}
         self.closed = False
         self._ends = ends
-        self._exposures = [20_000]
+        self._exposures, self._gains = [20_000], [2.0]
 
     def create_video_configuration(self, main: Mapping[str, Any], controls: Mapping[str, Any]) -> Any:
         return main, controls
@@ -242,6 +242,7 @@ class Pi:
         self.set.append(controls)
         time_us = 20_000 if controls.get("AeEnable") else controls["ExposureTime"]
         self._exposures += [*[self._exposures[-1]] * 2, time_us]
+        self._gains += [*[self._gains[-1]] * 2, controls.get("AnalogueGain", 2.0)]
 
     def start(self) -> None: ...
 
@@ -251,6 +252,7 @@ class Pi:
         self._ends -= 1
         if len(self._exposures) > 1:
             self._exposures.pop(0)
+            self._gains.pop(0)
         return self
 
     def make_array(self, name: str) -> Any:
@@ -258,7 +260,7 @@ class Pi:
 
     def get_metadata(self) -> Mapping[str, Any]:
         lines_us = self._exposures[0] // 18 * 18
-        return {"ExposureTime": lines_us, "AnalogueGain": 2.0, "SensorTimestamp": 5 + self._ends}
+        return {"ExposureTime": lines_us, "AnalogueGain": self._gains[0], "SensorTimestamp": 5 + self._ends}
 
     def release(self) -> None: ...
 
@@ -273,11 +275,12 @@ def test_a_pis_camera_is_set_and_told_by_its_frames(order: ExposureOrder) -> Non
     ours, theirs = socket.socketpair()
     with ours, theirs:
         frames = frames_of_picamera(source, camera, ChildEnd(theirs))
-        parts = []
+        parts, gains = [], []
         for frame in frames:
             parts.append(frame.exposure)
+            gains.append(frame.gain)
             if len(parts) in {12, 24}:
-                ChildEnd(ours).send(0.4 if len(parts) == 12 else 1.0)
+                ChildEnd(ours).send((0.4, 2.0) if len(parts) == 12 else (1.0, 1.0))
         theirs.close()
         daemon, states = ChildEnd(ours), list[ExposureState]()
         while daemon.has_news():
@@ -291,6 +294,7 @@ def test_a_pis_camera_is_set_and_told_by_its_frames(order: ExposureOrder) -> Non
     assert parts[:13] == [1.0] * 13
     assert parts[18:24] == [0.4] * 6
     assert parts[-8:] == [1.0] * 8
+    assert (gains[:13], gains[18:24], gains[-8:]) == ([1.0] * 13, [2.0] * 6, [1.0] * 8)
     (state,) = states  # neither lines nor a part of the usual exposure are another exposure
     assert state.mismatches(order) == ()
     assert state.is_manual is not order.is_empty

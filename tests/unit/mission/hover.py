@@ -75,7 +75,7 @@ class Hover:
             self.at_view()
             over = False
             while not over:
-                exposure, light = camera(self.scanner.exposure)
+                exposure, light = camera(self.scanner.exposure[0])
                 self.now_ns += STEP_NS
                 self.seq += 1
                 at = {"x_m": view.x_m, "y_m": view.y_m, "height_m": view.height_m, "yaw_rad": view.yaw_rad}

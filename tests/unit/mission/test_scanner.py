@@ -341,7 +341,7 @@ def test_what_is_lit_wrongly_is_looked_at_from_the_same_place_with_another_expos
     assert {view.exposure for view in relit} == {part}
     usual = {(view.x_m, view.y_m, view.height_m) for view in hover.views if view.exposure == 1.0}
     assert {(view.x_m, view.y_m, view.height_m) for view in relit} == usual
-    assert hover.scanner.exposure == 1.0
+    assert hover.scanner.exposure[0] == 1.0
     assert not hover.scanner.drain_events()
 
 
@@ -398,11 +398,11 @@ def test_an_empty_place_that_is_burnt_out_is_empty_by_the_exposure_that_shows_it
         over = False
         while not over:
             hover.now_ns, hover.seq = hover.now_ns + STEP_NS, hover.seq + 1
-            burnt = hover.scanner.exposure == 1.0
+            burnt = hover.scanner.exposure[0] == 1.0
             seen = Occupancy.GOODS if burnt else Occupancy.EMPTY
             light = Light.BURNT if burnt else Light.FAIR
             places = dict.fromkeys(view.locations, seen)
-            shown = picture(hover.seq, (), places, hover.now_ns, hover.scanner.exposure, light)
+            shown = picture(hover.seq, (), places, hover.now_ns, hover.scanner.exposure[0], light)
             here = pose(hover.now_ns, x_m=view.x_m, y_m=view.y_m, height_m=view.height_m)
             hover.scanner.take(shown, here)
             over = hover.scanner.step(hover.now_ns)

@@ -52,7 +52,7 @@ class ArDroneCamera:
         """Pictures of neither camera, and those out of order by the encoder's clock."""
         return self.unassigned + (0 if self._stream is None else self._stream.out_of_order)
 
-    def expose(self, part: float) -> None:
+    def expose(self, part: float, gain: float) -> None:
         """The drone exposes by itself: its pictures stay as they are."""
 
     async def run(self) -> None:
