@@ -214,14 +214,18 @@ def _fly_past(site: Site, leg: SweepLeg, scanner: Scanner, flight: Flight, seed:
     now_ns, seq = 1 + round(float(rng.uniform(0.0, 1.0)) * period_ns), 0
     scanner.begin_sweep([leg])
     scanner.begin_leg(0)
-    while (x_m := start_m + leg.speed_mps * now_ns * 1e-9) < end_m:
+    scanner.step_sweep(0, leg, leg.speed_mps)
+    x_m, how = start_m + leg.speed_mps * now_ns * 1e-9, scanner.exposure
+    while x_m < end_m:
         true, pose = _poses(rng, now_ns, (x_m, y_m, leg.height_m), leg)
         places = scanner.places(pose)
         if places:
-            picture = renderer.render(true, seq, exposure=leg.exposure)
-            scanner.take(read_shelf(picture, seq, now_ns, places, leg.exposure)[0], pose)
-        scanner.step_sweep(now_ns)
-        seq, now_ns = seq + 1, now_ns + period_ns
+            picture = renderer.render(true, seq, None, *how)
+            scanner.take(read_shelf(picture, seq, now_ns, places, *how)[0], pose)
+        speed_mps = min(leg.speed_mps, scanner.passing_mps)
+        scanner.step_sweep(now_ns, leg, speed_mps)
+        how = scanner.exposure
+        x_m, seq, now_ns = x_m + speed_mps * period_ns * 1e-9, seq + 1, now_ns + period_ns
     scanner.end_leg(leg)
     scanner.end_sweep(now_ns)
     return scanner.drain()[0]

@@ -32,6 +32,7 @@ _UNFOLLOWED = 8
 """Pictures in a row taken otherwise than asked for after which a camera is known not to follow."""
 _GRID = math.log(1.1)
 """Exposures are asked for in steps: none for each change of speed."""
+_TOUCH = 1e-6
 _SLOWEST = 0.5
 """Part of a leg's speed that it is flown with at least for want of light."""
 _SAME = 0.02
@@ -65,6 +66,7 @@ class _Lit:
 
     part: float
     settling: bool = False
+    changed: bool = False
     per_light: deque[float] = field(default_factory=lambda: deque(maxlen=_PICTURES))
     """What the white of paper was, by the light of its picture."""
 
@@ -113,6 +115,13 @@ class FaceLight:
         """Whether the camera supports exposure control, as far as is known."""
         return bool(self._exposes)
 
+    def drain_changed(self) -> list[tuple[Face, float]]:
+        """The fronts whose light was changed since the last call, and to which part of the usual one."""
+        changed = sorted((face, lit.part) for face, lit in self._faces.items() if lit.changed)
+        for face, _ in changed:
+            self._faces[face].changed = False
+        return changed
+
     def part(self, faces: Collection[Face], usual: float = 1.0) -> float:
         """The light that these fronts together want, as a part of the usual one; `usual` where no picture of
         them was taken."""
@@ -132,7 +141,12 @@ class FaceLight:
         return Shot(exposure, round(gain, 2), speed_mps)
 
     def take(
-        self, faces: Collection[Face], wanted: Shot, taken: tuple[float, float], white: float | None, usual: float
+        self,
+        faces: Collection[Face],
+        wanted: Shot,
+        taken: tuple[float, float],
+        white: float | None,
+        usual: float,
     ) -> None:
         """One picture of these fronts: it was `wanted` so, and `taken` with these parts of the usual exposure
         and gain; `white` as in `CodeSet`.  `usual` is the light that was planned for them."""
@@ -153,9 +167,10 @@ class FaceLight:
         lit.settling = not low <= expected <= high
         if lit.settling:
             step = min(max(_WANTED / expected, 1.0 / _MOST_STEP), _MOST_STEP)
-            lit.part = min(max(lit.part * step, self._least), self._most)
+            part = min(max(lit.part * step, self._least), self._most)
+            lit.changed, lit.part = lit.changed or part != lit.part, part
 
 
 def _on_grid(exposure: float) -> float:
     """The next shorter one that may be asked for; the usual one is."""
-    return round(math.exp(math.floor(math.log(exposure) / _GRID + _SAME) * _GRID), 4)
+    return round(math.exp(math.floor(math.log(exposure) / _GRID + _TOUCH) * _GRID), 4)

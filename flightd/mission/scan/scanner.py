@@ -309,6 +309,9 @@ class Scanner:
         left = ", ".join(f"{count} {reason}" for reason, count in sorted(why.items()))
         text = f"{why.total()} places to stop before" + (f": {left}" if left else "")
         self._events.append(Event(now_ns, EventLevel.INFO, "swept", text))
+        for (aisle, side, level), part in self._light.drain_changed():
+            text = f"aisle {aisle} {side}, level {level}: taken with {part:.2f} times the usual light"
+            self._events.append(Event(now_ns, EventLevel.INFO, "face_light", text))
         self._sweep = None
 
     def _leg_light(self, leg: SweepLeg) -> LegLight:
