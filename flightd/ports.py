@@ -95,9 +95,9 @@ class Camera(Protocol):
         ...
 
     def expose(self, part: float, gain: float) -> None:
-        """From now on, take pictures of these parts of the usual exposure and gain (1.0: the usual one again).
-        Never blocks.  Each ticket tells what its picture was taken with: a camera that cannot go by this
-        leaves it at 1.0."""
+        """From now on, take pictures of these parts of the usual exposure and gain (1.0: the usual one
+        again).  Never blocks.  Each ticket tells what its picture was taken with: a camera that cannot go by
+        this leaves it at 1.0."""
         ...
 
     async def run(self) -> None: ...

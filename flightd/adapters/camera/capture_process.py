@@ -165,9 +165,7 @@ def _of_device(source: Source, parent: ChildEnd) -> Iterator[Grabbed]:
                 yield Grabbed(frame.bgr, frame.arrival_ns, frame.device_ns, part)
                 held.look(exposure.is_usual)
                 while parent.has_news():
-                    part, _ = (
-                        parent.receive()
-                    )  # a driver's gain is a number of its own, and of no known scale
+                    part, _ = parent.receive()  # a driver's gain is a number of no known scale
                     exposure.ask(part)
         finally:
             exposure.give_back()

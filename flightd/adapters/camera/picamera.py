@@ -131,8 +131,8 @@ class PicameraExposure:
         self._told: ExposureState | None = None
 
     def ask(self, part: float, gain_part: float) -> None:
-        """Take frames with these parts of the usual exposure and gain from now on; 1.0 of both gives the usual
-        ones back."""
+        """Take frames with these parts of the usual exposure and gain from now on; 1.0 of both gives the
+        usual ones back."""
         if self._usual_s is None:
             return
         self._mixed = _LATE_FRAMES

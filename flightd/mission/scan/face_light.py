@@ -1,4 +1,4 @@
-"""How each rack front is lit, learnt from the pictures of it, and what its next ones are taken with.  Pure."""
+"""How each rack front is lit, learnt from its pictures, and what its next ones are taken with.  Pure."""
 
 from __future__ import annotations
 
@@ -96,10 +96,10 @@ class _Follows:
 class FaceLight:
     """Call `take` with each picture of a rack front; `shot` is what the next ones are wanted with.
 
-    Exposure is preferred to gain, which brings noise; no exposure is longer than blur allows at the speed that
-    is flown.  What gain of up to `most_gain` cannot make up for is flown past more slowly.  A front is left as
-    it is until its paper is really too dark or too light, and then made to be as wanted, step by step, from
-    `least` to `most` times the usual light."""
+    Exposure is preferred to gain, which brings noise; no exposure is longer than blur allows at the speed
+    that is flown.  What gain of up to `most_gain` cannot make up for is flown past more slowly.  A front is
+    left as it is until its paper is really too dark or too light, and then made to be as wanted, step by
+    step, from `least` to `most` times the usual light."""
 
     def __init__(self, least: float, most: float, most_gain: float) -> None:
         self._least, self._most, self._most_gain = least, most, most_gain

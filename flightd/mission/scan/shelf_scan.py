@@ -85,7 +85,7 @@ class ShelfScan:
         return legs
 
     def step(self, s: MissionInputs, stop: Stop) -> None:
-        """Decide what has been flown past by now on the way to `stop`, and look at what is being flown past."""
+        """Decide what has been flown past by now on the way to `stop`."""
         if self._sweeping:
             self._scanner.step_sweep(s.now_ns, stop.sweep, s.speed_mps)
 

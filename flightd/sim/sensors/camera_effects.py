@@ -67,8 +67,8 @@ class Sensor:
         light: Image | None = None,
         usual_light: float = 1.0,
     ) -> None:
-        """Turn an ideal picture into one taken with parts of the usual exposure and gain, in place.  `light` is that
-        on each of its pixels, (H, W, 3), where it is not `usual_light` all over."""
+        """Turn an ideal picture into one taken with parts of the usual exposure and gain, in place.
+        `light` is that on each of its pixels, (H, W, 3), where it is not `usual_light` all over."""
         draw = np.random.default_rng([self._seed, seq]) if self._bank is not None else None
         beat = math.sin(math.tau * ((stamp_ns * 1e-9 * _MAINS_HZ) % 1.0))
         exposure = part * gain * self._look.exposure * (1.0 + self._look.flicker * beat)
