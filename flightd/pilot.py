@@ -107,6 +107,11 @@ class Pilot:
         return self._mission.plan
 
     @property
+    def looks(self) -> bool:
+        """Whether the front camera's pictures are wanted now."""
+        return self._scanner.looking
+
+    @property
     def exposure(self) -> tuple[float, float]:
         """What the front camera's pictures are wanted with, as parts of its usual exposure and gain."""
         return self._scanner.exposure

@@ -80,6 +80,15 @@ class Interlock(Protocol):
     async def run(self) -> None: ...
 
 
+class Lamp(Protocol):
+    """Lights the shelf before the front camera.  `shine` says at each tick whether it is wanted, and never
+    blocks: where that was not said for half a second it goes out.  `run` switches it until cancelled."""
+
+    def shine(self, on: bool) -> None: ...
+
+    async def run(self) -> None: ...
+
+
 class Camera(Protocol):
     """The down camera or the front camera.  `run` delivers tickets of pictures in shared memory until
     cancelled; it raises TransientError when the source failed and another `run` may succeed."""

@@ -70,6 +70,16 @@ class NoGround:
         pass
 
 
+class NoLamp:
+    """`ports.Lamp` that is not fitted."""
+
+    def shine(self, on: bool) -> None:
+        pass
+
+    async def run(self) -> None:
+        await _idle()
+
+
 class NoInterlock:
     """`ports.Interlock` where no site demands one: people may be anywhere."""
 
@@ -134,6 +144,7 @@ def keep_pose(pose: SharedPose | None) -> None:
 NO_RECORDER = NoRecorder()
 NO_GROUND = NoGround()
 NO_INTERLOCK = NoInterlock()
+NO_LAMP = NoLamp()
 NO_FITNESS = NoFitness()
 NO_CAMERA = NoCamera()
 NO_COUNTING = NoCounting()

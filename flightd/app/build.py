@@ -16,15 +16,18 @@ from flightd.adapters.ground_link.link import ZmqGround
 from flightd.adapters.ground_link.maintenance_desk import Maintainer
 from flightd.adapters.ground_link.messages.floor import CameraOptics
 from flightd.adapters.interlock import FileInterlock
+from flightd.adapters.lamp import LedLamp, SwitchedLamp
 from flightd.adapters.store.learnt_sensors import learnt_file
 from flightd.adapters.store.progress import progress_file
 from flightd.adapters.vehicle.connect import connect_vehicle
+from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
 from flightd.app.absent_parts import (
     NO_CAMERA,
     NO_COUNTING,
     NO_FITNESS,
     NO_GROUND,
     NO_INTERLOCK,
+    NO_LAMP,
     NO_RECORDER,
     NOTHING_KEPT,
     keep_pose,
@@ -40,6 +43,7 @@ from flightd.app.frame_tap import NO_FRAMES, FrameTap
 from flightd.app.publishers import TelemetryPublishers
 from flightd.app.setpoint_pump import SetpointPump
 from flightd.config.ground import GroundConfig
+from flightd.config.lamp import SWITCHED_BY, LampKind, lamp_switch
 from flightd.config.mission import HEIGHT_ROOM_M
 from flightd.config.schema import Config
 from flightd.config.sweep import ScanMode
@@ -63,7 +67,7 @@ from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.sweep_speed import SweepOptics
 from flightd.mission.scan.views import view_height_m
 from flightd.pilot import Pilot
-from flightd.ports import Camera, Clock, Ground, Interlock, Monitor, PoseTaker, Recorder, Vehicle
+from flightd.ports import Camera, Clock, Ground, Interlock, Lamp, Monitor, PoseTaker, Recorder, Vehicle
 from flightd.runtime.clock import Hold
 from flightd.runtime.datagrams import OpenDatagrams, open_datagrams
 from flightd.runtime.supervisor import FaultBarrier
@@ -140,6 +144,7 @@ def build(
         config,
         site,
         pilot,
+        lamp=lamp_of(config, vehicle, clock, publishers.trouble),
         vehicle=vehicle,
         setpoints=SetpointPump(vehicle, clock, noted(vision.latency, recorder, publishers.barrier), TICK_S),
         vision=vision,
@@ -176,6 +181,7 @@ def assemble(
     interlock: Interlock | None = None,
     fitness: Fitness = NO_FITNESS,
     down_frames: FrameTap = NO_FRAMES,
+    lamp: Lamp = NO_LAMP,
 ) -> Flight:
     """Put a flight together from what is connected already.  `cameras` are the down and the front one;
     `keep_files`: the stops left over are kept in `mission.progress`, what is learnt of the sensors in
@@ -202,7 +208,25 @@ def assemble(
         interlock=interlock or interlock_of(config, site, clock),
         fitness=fitness,
         down_frames=down_frames,
+        lamp=lamp,
     )
+
+
+def lamp_of(config: Config, vehicle: Vehicle, clock: Clock, on_trouble: Callable[[str], None]) -> Lamp:
+    """The configured lamp.  InputError where the vehicle has no such output."""
+    switch = lamp_switch(config.front_camera.lamp)
+    if switch is None:
+        return NO_LAMP
+    if switch.kind is LampKind.LED:
+        return SwitchedLamp(clock, LedLamp(switch.name), on_trouble, repeats=True)
+    kind = SWITCHED_BY[switch.kind]
+    if config.vehicle.kind != kind or not isinstance(vehicle, MavlinkVehicle):
+        raise InputError(
+            f"{config.front_camera.lamp}: only a vehicle of kind {kind} has such an output",
+            key="front_camera.lamp",
+            remedy="give the lamp of this vehicle, or led:NAME",
+        )
+    return SwitchedLamp(clock, vehicle.output(switch.number), on_trouble)
 
 
 def noted(

@@ -84,6 +84,7 @@ class Daemon:
             "recorder": self._kept(flight.recorder.run),
             "ground": self._kept(flight.ground.run),
             "interlock": self._kept(flight.interlock.run),
+            "lamp": self._kept(flight.lamp.run),
             "fitness": self._kept(partial(flight.fitness.run, self._waits)),
             "progress": self._kept(flight.progress.run),
             "learnt sensors": self._kept(flight.learnt.run),

@@ -17,7 +17,7 @@ from flightd.core.shared_pose import SharedPose
 from flightd.core.tick import TickOutput
 from flightd.core.types import AttitudeSetpoint, LineSet
 from flightd.pilot import Pilot
-from flightd.ports import Camera, Clock, Ground, Interlock, Recorder, Vehicle
+from flightd.ports import Camera, Clock, Ground, Interlock, Lamp, Recorder, Vehicle
 
 T_contra = TypeVar("T_contra", contravariant=True)
 
@@ -150,6 +150,7 @@ class Flight:
     setpoints: SetpointSink
     camera: Camera
     front_camera: Camera
+    lamp: Lamp
     vision: Vision
     counting: Count
     recorder: Recorder

@@ -11,7 +11,7 @@ from flightd.core.outlook import NO_OUTLOOK
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.topics import Topic
-from flightd.core.types import Command, CommandKind, Health
+from flightd.core.types import LOOKING, Command, CommandKind, Health
 from flightd.ports import CountsDrops
 
 
@@ -94,6 +94,7 @@ class Tick:
         call("pose output", lambda: flight.share_pose(output.shared), None)
         call("count", lambda: flight.counting.keep(output), None)
         call("front camera", lambda: flight.front_camera.expose(*flight.pilot.exposure), None)
+        call("lamp", lambda: flight.lamp.shine(flight.pilot.looks and output.phase in LOOKING), None)
         call("progress", self._keep, None)
 
     def _keep(self) -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from flightd.config.camera import FocalX, FocalY, Height, OpticsSection, Width
 from flightd.config.exposure_keys import ByHand, Gain, MainsHz
+from flightd.config.lamp import lamp_switch
 from flightd.core.camera_view import ForwardMount
 from flightd.core.exposure import ExposureOrder
 
@@ -46,6 +47,17 @@ class FrontCameraConfig(OpticsSection):
     manual_exposure: ByHand = False
     gain: Gain = None
     anti_flicker_hz: MainsHz = 0
+    lamp: str = Field(
+        "",
+        description="what lights the shelf while it is looked at: led:NAME of /sys/class/leds, relay:N of an "
+        "ArduPilot (0 to 15), actuator:N of a PX4 (1 to 6); empty: nothing",
+    )
+
+    @field_validator("lamp")
+    @classmethod
+    def _is_lamp(cls, value: str) -> str:
+        lamp_switch(value)  # knows what there is
+        return value
 
     @property
     def is_fitted(self) -> bool:

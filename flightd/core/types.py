@@ -429,6 +429,8 @@ WAITING = frozenset({Phase.PREFLIGHT, Phase.SWAP})
 """On the floor before a flight."""
 AT_STOP = frozenset({Phase.HOVER, Phase.CLIMB, Phase.SCAN})
 """At a node that is visited: over it, or beside it where a scan looks again from nearer or from aside."""
+LOOKING = frozenset({Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.SCAN})
+"""In which shelves may be looked at."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,6 +47,8 @@ from flightd.site.site import Site
 from flightd.site.site_file import site_toml
 
 _TRUTH_PERIOD_S = 0.02
+_LAMP = 0.9
+"""The light of the drone's lamp 1 m away, as a part of the usual one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +142,7 @@ class World:
             battery_frac=spec.battery_frac,
         )
         self.vehicle: VehiclePeer
+        lamp: Callable[[], float] = float
         show: Callable[[Image, int], None] | None = None
         own_front: CameraPeer | None = None
         if spec.truth_url:
@@ -147,14 +150,18 @@ class World:
         elif spec.vehicle == "ardrone":
             self.vehicle, show, own_front = _ardrone(spec, airframe, clock, hold)
         else:
-            self.vehicle = _autopilot(spec, airframe, clock)
+            self.vehicle = autopilot = _autopilot(spec, airframe, clock)
+
+            def lamp() -> float:
+                return _LAMP if autopilot.lamp_lit else 0.0
+
         swaps = spec.swap_s and not spec.truth_url
         self._battery_swapper = BatterySwapper(spec.site, airframe, spec.swap_s) if swaps else None
         self._cameras = {"camera": _down_camera(spec, self.vehicle, clock, show, hold)}
         if own_front is not None:
             self._cameras["ardrone-front-camera"] = own_front
         if spec.front is not None:
-            self._cameras["front-camera"] = _front_camera(spec, spec.front, self.vehicle, clock, hold)
+            self._cameras["front-camera"] = _front_camera(spec, spec.front, self.vehicle, clock, hold, lamp)
         self._faults = WorldFaults(spec.faults, spec.site, self._cameras, airframe, self.vehicle, tell)
 
     async def open(self) -> tuple[str, int]:
@@ -248,12 +255,20 @@ def _down_camera(
 
 
 def _front_camera(
-    spec: WorldSpec, front: FrontSpec, vehicle: VehiclePeer, clock: Clock, hold: Hold
+    spec: WorldSpec,
+    front: FrontSpec,
+    vehicle: VehiclePeer,
+    clock: Clock,
+    hold: Hold,
+    lamp: Callable[[], float],
 ) -> CameraPeer:
     look = spec.unknowns.racks(front.appearance, spec.site, spec.seed)
     make = partial(FrontRenderer, spec.site, front.camera, look, spec.seed)
-    seed, name, truth_at = f"front camera {spec.seed}", "front camera", vehicle.truth_at
-    return CameraPeer(front.camera, make, seed, front.address, truth_at, clock, hold=hold, name=name)
+    seed, truth_at = f"front camera {spec.seed}", vehicle.truth_at
+    address = front.address
+    return CameraPeer(
+        front.camera, make, seed, address, truth_at, clock, hold=hold, name="front camera", lamp=lamp
+    )
 
 
 def _cause(failures: ExceptionGroup[Exception]) -> FlightdError:

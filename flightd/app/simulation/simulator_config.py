@@ -20,6 +20,7 @@ from flightd.site.site_file import load_site
 
 _FRONT_CAMERA_URL = "udp://127.0.0.1:5601"
 """That there is a front camera; where it is reached is each simulation's own."""
+_LAMPS = {"ardupilot": "relay:0", "px4": "actuator:1"}
 
 
 def simulator_config(
@@ -46,6 +47,7 @@ def simulator_config(
         if not equals:
             raise InputError(f"--set {setting}: expected KEY=VALUE, for example mission.heading=shelf")
         _lay(table, key, _value(key, text))
+    _hang_lamp(table)
     config = parse_config(table, path)
     site = _site(config, warehouse)
     # an AR.Drone carries no second computer to see the racks with
@@ -53,6 +55,13 @@ def simulator_config(
         _lay(table, "front_camera.url", _FRONT_CAMERA_URL)
         config = parse_config(table, path)
     return config, site
+
+
+def _hang_lamp(table: dict[str, Any]) -> None:
+    """The simulated lamp hangs on the simulated autopilot, whatever switches the real one."""
+    front, vehicle = table.get("front_camera"), table.get("vehicle", {})
+    if isinstance(front, dict) and front.get("lamp") and isinstance(vehicle, dict):
+        front["lamp"] = _LAMPS.get(vehicle.get("kind", "ardupilot"), "")
 
 
 def _site(config: Config, warehouse: str | None) -> Site:

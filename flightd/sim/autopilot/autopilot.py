@@ -135,6 +135,8 @@ class AutopilotPeer(abc.ABC):
         self.reports_landed = True
         """Otherwise it reports to be in the air for ever."""
         self.texts: deque[str] = deque(maxlen=_TEXTS_KEPT)
+        self.lamp_lit = False
+        """Whether its output that a lamp hangs on is switched on."""
         """What others gave it to show, newest last."""
         self._climb_loop = ClimbLoop(ClimbGains(hover_guess=airframe.params.hover_collective))
         self._stick_yaw_rad = 0.0
@@ -264,6 +266,10 @@ class AutopilotPeer(abc.ABC):
     @abc.abstractmethod
     def _command(self, command: int, params: tuple[float, ...]) -> int:
         """Obey a command of this firmware's own; the MAV_RESULT."""
+
+    @abc.abstractmethod
+    def _set_output(self, command: int, params: tuple[float, ...]) -> int:
+        """Switch what a lamp hangs on; the MAV_RESULT."""
 
     @abc.abstractmethod
     def _set_mode(self, custom_mode: int) -> int:
@@ -428,6 +434,8 @@ class AutopilotPeer(abc.ABC):
             case dialect.MAV_CMD_DO_SET_MODE:
                 custom = params[0] == params[0] and int(params[0]) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
                 result = self._set_mode(self._mode_of(params)) if custom else dialect.MAV_RESULT_DENIED
+            case dialect.MAV_CMD_DO_SET_RELAY | dialect.MAV_CMD_DO_SET_ACTUATOR:
+                result = self._set_output(message.command, params)
             case _:
                 result = self._command(message.command, params)
         header = message.get_header()

@@ -26,6 +26,7 @@ from flightd.sim.autopilot.telemetry import LANDED_AIR, LANDED_GROUND, LANDED_LA
 from flightd.sim.plant.airframe import Airframe, AirframeCommand
 
 _THRUST_IS_COLLECTIVE = 8
+_RELAYS = 16
 _IDLE_COLLECTIVE = 0.05
 _LAND_DETECT_S = 1.0
 _PAUSE_S = 4.0
@@ -146,6 +147,14 @@ class ArduCopterPeer(AutopilotPeer):
                 return int(dialect.MAV_RESULT_ACCEPTED)
             case _:
                 return int(dialect.MAV_RESULT_UNSUPPORTED)
+
+    def _set_output(self, command: int, params: tuple[float, ...]) -> int:
+        if command != dialect.MAV_CMD_DO_SET_RELAY:
+            return int(dialect.MAV_RESULT_UNSUPPORTED)
+        if params[0] not in range(_RELAYS) or params[1] not in {0.0, 1.0}:
+            return int(dialect.MAV_RESULT_FAILED)
+        self.lamp_lit = params[1] == 1.0
+        return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _arm_or_disarm(self, arm: float, *, forced: bool) -> int:
         if arm == 1:

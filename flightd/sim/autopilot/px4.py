@@ -122,6 +122,13 @@ class Px4Peer(AutopilotPeer):
         main, sub = params[1], params[2]
         return int(main) << 16 | int(sub) << 24 if 0 <= main < 256 and 0 <= sub < 256 else -1
 
+    def _set_output(self, command: int, params: tuple[float, ...]) -> int:
+        if command != dialect.MAV_CMD_DO_SET_ACTUATOR or params[6] != 0.0:
+            return int(dialect.MAV_RESULT_UNSUPPORTED)
+        set_to = [value for value in params[:6] if not math.isnan(value)]
+        self.lamp_lit = any(value > 0.0 for value in set_to) if set_to else self.lamp_lit
+        return int(dialect.MAV_RESULT_ACCEPTED)
+
     def _command(self, command: int, params: tuple[float, ...]) -> int:
         match command:
             case dialect.MAV_CMD_COMPONENT_ARM_DISARM if params[0] == 1:

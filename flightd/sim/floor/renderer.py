@@ -73,6 +73,7 @@ class Renderer:
         out: Image | None = None,
         exposure: float = 1.0,
         gain: float = 1.0,
+        lamp: float = 0.0,  # noqa: ARG002 - it does not light the floor
     ) -> Image:
         """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise,
         `exposure` and `gain` are its parts of the camera's usual ones.

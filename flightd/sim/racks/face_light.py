@@ -21,6 +21,7 @@ USUAL_LIGHT = 64
 _MOST = 255 / USUAL_LIGHT
 _COARSE = 8
 """A map is drawn at a fraction of the resolution."""
+_NEAREST_M2 = 0.1
 _SOFT_PX = 3
 """Over so many pixels of that the light of one level goes over into the next one's."""
 
@@ -55,10 +56,11 @@ class FaceLight:
         self._size = lens.width_px, lens.height_px
         self._lens = lens.scaled(max(lens.width_px // _COARSE, 1), max(lens.height_px // _COARSE, 1))
 
-    def draw(self, at: Viewpoint, seen: Iterable[Sightline]) -> Image | None:
+    def draw(self, at: Viewpoint, seen: Iterable[Sightline], lamp: float = 0.0) -> Image | None:
         """(H, W, 3) light of each pixel of a picture taken at `at`, `USUAL_LIGHT` being 1; None where all of
-        it is usual."""
-        if not self._light:
+        it is usual.  The lamp beside the camera adds `lamp` to it 1 m
+        away, by the square of the distance less."""
+        if not self._light and not lamp:
             return None
         drawn = np.full((self._lens.height_px, self._lens.width_px, 4), USUAL_LIGHT, np.uint8)
         pane = Pane(CameraView(self._lens, at), drawn)
@@ -67,7 +69,9 @@ class FaceLight:
             decks_m = [0.0, *(level.deck_m - level.beam_m for level in face.levels[1:])]
             tops_m = [*decks_m[1:], face.shelf.height_m]
             for number, (low_m, high_m) in enumerate(zip(decks_m, tops_m, strict=True), start=1):
-                level = USUAL_LIGHT * min(self._of(face.shelf.aisle, face.shelf.side, number), _MOST)
+                light = self._of(face.shelf.aisle, face.shelf.side, number)
+                light += lamp / max((face.y_m - at.y_m) ** 2, _NEAREST_M2)
+                level = USUAL_LIGHT * min(light, _MOST)
                 for x0_m, x1_m in sight.bays():
                     ends = (x0_m, low_m), (x1_m, low_m), (x1_m, high_m), (x0_m, high_m)
                     corners = np.array([(x, face.y_m, height) for x, height in ends])

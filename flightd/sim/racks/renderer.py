@@ -78,9 +78,11 @@ class FrontRenderer:
         out: Image | None = None,
         exposure: float = 1.0,
         gain: float = 1.0,
+        lamp: float = 0.0,
     ) -> Image:
         """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise,
-        `exposure` and `gain` are its parts of the camera's usual ones.
+        `exposure` and `gain` are its parts of the camera's usual ones, `lamp` the light
+        of the lamp beside it, 1 m away.
 
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
         picture = picture_for(self._camera.lens, out)
@@ -95,7 +97,7 @@ class FrontRenderer:
             drawn = np.asarray(cv2.remap(drawn, *self._bend, cv2.INTER_LINEAR), np.uint8)
         cv2.cvtColor(drawn, cv2.COLOR_BGRA2BGR, dst=picture)
         self._blur(picture, kinematics, _distance_m(view, seen), exposure)
-        light = self._light.draw(view, seen)
+        light = self._light.draw(view, seen, lamp)
         self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure, gain, light, USUAL_LIGHT)
         return picture
 

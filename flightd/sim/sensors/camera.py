@@ -52,7 +52,8 @@ class Optics(Protocol):
 
 
 class PictureMaker(Protocol):
-    """Renders one camera's pictures, each with a part of the camera's usual exposure, and of its gain."""
+    """Renders one camera's pictures, each with a part of the camera's usual exposure, and of its gain; `lamp`
+    is the light of the lamp beside it, 1 m away, as a part of the usual one."""
 
     def render(
         self,
@@ -61,11 +62,12 @@ class PictureMaker(Protocol):
         out: Image | None = None,
         exposure: float = 1.0,
         gain: float = 1.0,
+        lamp: float = 0.0,
     ) -> Image: ...
 
 
-_How: TypeAlias = tuple[float, float]
-"""Parts of the usual exposure and gain."""
+_How: TypeAlias = tuple[float, float, float]
+"""Parts of the usual exposure and gain, and the lamp's light."""
 
 
 class _RenderWorker:
@@ -132,9 +134,9 @@ class CameraPeer:
     `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them.
 
     `make` is called in the rendering process (it must be picklable); `seed` draws the delivery's jitter.
-    While `wanted` says no, no picture is taken.  Time is held by `hold` while one is being drawn.  A renderer
-    that fails ends it with a RunError that has the camera's `name`: a flight that goes on blind for a fault
-    of its world tells nothing."""
+    While `wanted` says no, no picture is taken; `lamp` is that of `PictureMaker`.  Time is held by `hold`
+    while one is being drawn.  A renderer that fails ends it with a RunError that has the camera's `name`: a
+    flight that goes on blind for a fault of its world tells nothing."""
 
     def __init__(
         self,
@@ -148,8 +150,10 @@ class CameraPeer:
         wanted: Callable[[], bool] = lambda: True,
         hold: Hold = contextlib.nullcontext,
         name: str = "camera",
+        lamp: Callable[[], float] = float,
     ) -> None:
         self._name = name
+        self._lamp = lamp
         self._wanted = wanted
         self._hold = hold
         self._show = show
@@ -213,7 +217,8 @@ class CameraPeer:
                 straggles = seq % self.trouble.straggler_every == 0
                 late_s = self.trouble.late_s + (self.trouble.straggler_s if straggles else 0.0)
                 due_ns += round(late_s * 1e9)
-                pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, self._how))
+                how = *self._how, self._lamp()
+                pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, how))
             seq += 1
 
     async def _deliver(
@@ -244,7 +249,7 @@ class CameraPeer:
             truth.stamp_ns + _CLOCK_OFFSET_NS,
             lens.width_px,
             lens.height_px,
-            *how,
+            *how[:2],
         )
         transport.sendto(encode_notice(notice))
 

@@ -112,6 +112,7 @@ class Broken:
         out: Image | None = None,
         exposure: float = 1.0,
         gain: float = 1.0,
+        lamp: float = 0.0,
     ) -> Image:
         if seq == 2:
             raise ValueError("a picture\nof nothing")
@@ -132,6 +133,7 @@ class Dying:
         out: Image | None = None,
         exposure: float = 1.0,
         gain: float = 1.0,
+        lamp: float = 0.0,
     ) -> Image:
         raise AssertionError
 
@@ -167,6 +169,7 @@ class Slow:
         out: Image | None = None,
         exposure: float = 1.0,
         gain: float = 1.0,
+        lamp: float = 0.0,
     ) -> Image:
         until_s = time.monotonic() + 1.5 / CAMERA.fps
         while time.monotonic() < until_s:

@@ -29,6 +29,7 @@ from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import BEATS_HZ, B
 from flightd.adapters.vehicle.mavlink.services.parameters import Parameters
 from flightd.adapters.vehicle.mavlink.services.statustext import SEVERITIES, TextAssembler, make_texts
 from flightd.adapters.vehicle.mavlink.services.stream_rates import StreamKeeper
+from flightd.adapters.vehicle.mavlink.services.switched_output import SwitchedOutput
 from flightd.adapters.vehicle.mavlink.setpoint import attitude_target
 from flightd.adapters.vehicle.mavlink.setpoint_shaper import SetpointShaper
 from flightd.adapters.vehicle.mavlink.telemetry import ClimbSource, MavlinkTelemetry, version_words
@@ -219,6 +220,10 @@ class MavlinkVehicle(abc.ABC):
     def gives_pose(self) -> bool:
         """Whether the autopilot's estimator is told of the motion."""
         return self._pose.use is PoseUse.GIVEN
+
+    def output(self, number: int) -> SwitchedOutput:
+        """One of the autopilot's own outputs."""
+        return SwitchedOutput(self._commander, self.firmware, number)
 
     # For who looks after it on the ground
 
