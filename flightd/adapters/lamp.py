@@ -117,7 +117,7 @@ def keep_led(parent: ChildEnd, led: Path) -> None:
         most = (led / "max_brightness").read_text(encoding="ascii").strip()
         try:
             while True:
-                heard = select.select([parent], [], [], _SILENT_S)[0]
+                heard = parent.has_news() or select.select([parent], [], [], _SILENT_S)[0]
                 _write(led, most if heard and parent.receive() else "0")
         finally:
             with contextlib.suppress(OSError):

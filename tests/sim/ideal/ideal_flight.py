@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
+from flightd.app.absent_parts import NO_LAMP
 from flightd.app.build import assemble, pilot_of
 from flightd.app.flight import Flight
 from flightd.app.publishers import TelemetryPublishers
@@ -32,6 +33,7 @@ from flightd.core.types import (
     PictureCheck,
     VehicleState,
 )
+from flightd.ports import Lamp
 from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.plant.battery_swapper import BatterySwapper
@@ -168,6 +170,7 @@ class IdealFlight:
         self._last_seen: LineSet | None = None
         self.ground_silent_s = 0.0
         self.aisle_closed = True
+        self.lamp: Lamp = NO_LAMP
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
         self._battery_swapper = BatterySwapper(site, self.airframe, swap_s) if swap_s else None
@@ -196,6 +199,7 @@ class IdealFlight:
             ground=ground,
             counting=IdealCount(self._codes, self._take_counted),
             interlock=IdealInterlock(lambda: self.aisle_closed),
+            lamp=self.lamp,
         )
 
     def fly(self, limit_s: float = 600.0) -> Flown:

@@ -26,6 +26,33 @@ from tests.unit.mission.shelves import SIGHT, SITE
 SWEEP = CONFIG.with_values(scan={"mode": ScanMode.SWEEP})
 
 
+class Lamp:
+    """Whether it was wanted lit, tick by tick."""
+
+    def __init__(self) -> None:
+        self.told: list[bool] = []
+
+    def shine(self, on: bool) -> None:
+        self.told.append(on)
+
+    async def run(self) -> None: ...
+
+
+def test_the_lamp_is_lit_while_shelves_are_looked_at_and_at_no_other_time() -> None:
+    flight = IdealFlight(SITE, SWEEP, visits=NODES, seed=5, front=IdealFront(SITE, SIGHT, STOCK))
+    flight.lamp = lamp = Lamp()
+    phases: list[Phase] = []
+    flight.on_tick = lambda phase, _: phases.append(phase)
+    flown = flight.fly()
+    assert flown.phase is Phase.DONE, flown.reason
+    assert len(lamp.told) == len(phases)
+    lit = [phase for phase, on in zip(phases, lamp.told, strict=True) if on]
+    assert Phase.FOLLOW in lit
+    assert set(lit) <= {Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.SCAN}
+    after = phases[len(lamp.told) - lamp.told[::-1].index(True) :]
+    assert Phase.FOLLOW in after, "dark on the way home"
+
+
 def test_shelves_are_counted_in_passing_at_the_height_of_each_level_and_nose_to_them() -> None:
     front = IdealFront(SITE, SIGHT, STOCK)
     flown = IdealFlight(SITE, SWEEP, visits=NODES, seed=5, front=front).fly()

@@ -36,8 +36,8 @@ def one_thread() -> Iterator[None]:
     cv2.setNumThreads(threads)
 
 
-def flown_past(lit: float, *, learns: bool) -> tuple[dict[str, Finding], int]:
-    """What is found on the left of aisle A in that light, and how many places there are."""
+def flown_past(lit: float, *, learns: bool, lamp: float = 0.0) -> tuple[dict[str, Finding], int]:
+    """What is found on the left of aisle A in that light, by that lamp, and how many places there are."""
     expert = {} if learns else {"darker": 1.0, "brighter": 1.0}
     config = load_config(shipped("sim.toml")).with_values(
         front_camera={"url": "udp://127.0.0.1:0"}, scan={"mode": "sweep", "expert": expert}
@@ -62,7 +62,7 @@ def flown_past(lit: float, *, learns: bool) -> tuple[dict[str, Finding], int]:
             moves = speed_mps, 0.0, 0.0, 0.0, 0.0, leg.yaw_rad, 0.0, 0.0, 0.0
             true = Kinematics(now_ns, x_m, y_m, leg.height_m, *moves)
             taken = how[0]  # asked for two pictures ago
-            picture = renderer.render(true, seq, None, *taken)
+            picture = renderer.render(true, seq, None, *taken, lamp)
             scanner.take(read_shelf(picture, seq, now_ns, places, *taken)[0], pose)
         scanner.step_sweep(now_ns, leg, speed_mps)
         how = [*how[1:], scanner.exposure]
@@ -91,3 +91,11 @@ def test_a_dark_or_over_lit_front_is_counted_as_well_but_for_where_its_light_was
     assert len(left_alone) <= count / 2
     assert len(found) >= count - 1
     assert states(found).items() <= right.items()
+
+
+def test_a_lamp_lights_a_dark_front() -> None:
+    """By itself, without another exposure."""
+    without, count = flown_past(0.2, learns=False)
+    lit, _ = flown_past(0.2, learns=False, lamp=0.9)
+    assert len(without) <= count / 2
+    assert len(lit) == count
