@@ -55,7 +55,7 @@ from flightd.core.shared_pose import SharedPose
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TICK_S
 from flightd.core.topics import Topic
-from flightd.core.types import AttitudeSetpoint
+from flightd.core.types import AttitudeSetpoint, EventLevel
 from flightd.mission.battery.sorties import check_battery
 from flightd.mission.guidance import CEILING_MARGIN_M
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
@@ -144,7 +144,7 @@ def build(
         config,
         site,
         pilot,
-        lamp=lamp_of(config, vehicle, clock, publishers.trouble),
+        lamp=lamp_of(config, vehicle, clock, partial(publishers.note, EventLevel.WARNING, "lamp")),
         vehicle=vehicle,
         setpoints=SetpointPump(vehicle, clock, noted(vision.latency, recorder, publishers.barrier), TICK_S),
         vision=vision,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import cache
 
 import cv2
 import pytest
@@ -36,6 +37,7 @@ def one_thread() -> Iterator[None]:
     cv2.setNumThreads(threads)
 
 
+@cache
 def flown_past(lit: float, *, learns: bool, lamp: float = 0.0) -> tuple[dict[str, Finding], int]:
     """What is found on the left of aisle A in that light, by that lamp, and how many places there are."""
     expert = {} if learns else {"darker": 1.0, "brighter": 1.0}

@@ -217,3 +217,46 @@ def test_it_draws_from_anywhere(height_m: float, yaw_deg: float) -> None:
 def test_a_picture_of_another_size_is_refused() -> None:
     with pytest.raises(ValueError, match="1280x800"):
         renderer().render(facing(next(iter(places().values()))), 0, np.empty((10, 10, 3), np.uint8))
+
+
+def left_front() -> StockPlace:
+    return next(p for p in places().values() if p.opening.location.side is Side.LEFT and p.labels)
+
+
+def in_light(**light: float) -> FrontRenderer:
+    named = {name.replace("_", " "): factor for name, factor in light.items()}
+    return FrontRenderer(SITE, CAMERA, replace(STILL, light=named), SEED)
+
+
+def test_light_falls_on_its_own_front_and_level() -> None:
+    pose = facing(left_front(), 0, roll_rad=0.0, pitch_rad=0.0, height_m=1.35)
+    usual = in_light().render(pose, 0).astype(float)
+    dim = in_light(A_left_1=0.5).render(pose, 0).astype(float)
+    assert dim[600:, 400:].mean() / usual[600:, 400:].mean() == pytest.approx(0.5, abs=0.02)
+    assert np.abs(dim[:250] - usual[:250]).mean() < 1.0
+    assert np.array_equal(in_light(A_right=0.5).render(pose, 0), usual.astype(np.uint8))
+
+
+def test_what_is_over_lit_is_not_lost_for_a_shorter_exposure() -> None:
+    pose = facing(left_front(), 0)
+    usual, bright = in_light().render(pose, 0).astype(float), in_light(A_left=3.0)
+    assert (bright.render(pose, 0) == 255).mean() > 0.05
+    shorter = bright.render(pose, 0, None, 1.0 / 3.0).astype(float)
+    assert np.abs(shorter - usual)[200:-200, 300:-300].mean() < 2.0
+
+
+def test_gain_brings_light_and_noise() -> None:
+    noisy = FrontRenderer(SITE, CAMERA, replace(STILL, noise=2.0), SEED)
+    pose = facing(left_front(), 0)
+    still = in_light().render(pose, 0).astype(float)
+    usual, gained = noisy.render(pose, 0), noisy.render(pose, 0, None, 0.25, 4.0)
+    assert gained.mean() == pytest.approx(usual.mean(), rel=0.03)
+    assert np.abs(gained - still).mean() > 1.5 * np.abs(usual - still).mean()
+
+
+def test_a_lamp_lights_what_is_near() -> None:
+    node = SITE.nodes[left_front().opening.location.node]
+    near, far = (facing(left_front(), 0, y_m=node.y_m + off_m) for off_m in (-0.3, 0.3))
+    dark = in_light(A_left=0.1)
+    brighter = [dark.render(pose, 0, lamp=0.9).mean() - dark.render(pose, 0).mean() for pose in (near, far)]
+    assert max(brighter) > 1.3 * min(brighter) > 10.0

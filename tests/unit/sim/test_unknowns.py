@@ -10,6 +10,8 @@ from flightd.app.simulation.prepare import SimOptions
 from flightd.config.paths import shipped
 from flightd.core.errors import InputError
 from flightd.sim.plant.airframe import AirframeParams
+from flightd.sim.racks.appearance import RackAppearance
+from flightd.sim.racks.face_light import check_names
 from flightd.sim.sensors.instruments import SensorParams
 from flightd.sim.sensors.optics import SimCamera
 from flightd.sim.unknowns import NOTHING, SPREADS, WorldKind, unknowns_of
@@ -68,3 +70,21 @@ def test_an_airframe_that_there_is_not_is_refused() -> None:
         SimOptions(plant="kite").check()
     with pytest.raises(InputError, match=r"--truth-url the other simulator is the airframe"):
         SimOptions(plant="rotorpy", truth_url="tcp:h:1", vehicle_url="tcp:h:2").check()
+
+
+def test_each_level_of_each_rack_front_has_its_light_and_what_was_told_of_it_stands() -> None:
+    site = load_site(shipped("site-racks-small.toml"))
+    assert NOTHING.racks(RackAppearance(), site, 3) == RackAppearance()
+    drawn = unknowns_of(WorldKind.ROUGH, 3).racks(RackAppearance(), site, 3).light
+    assert len(drawn) == len({(p.aisle, p.side, p.level) for p in site.locations.values()})
+    assert 0.35 <= min(drawn.values()) < 0.8
+    assert 1.2 < max(drawn.values()) <= 1.8
+    told = RackAppearance(light={"A left": 0.5})
+    assert unknowns_of(WorldKind.ROUGH, 3).racks(told, site, 3) == told
+
+
+def test_light_of_a_front_that_is_not_there_is_refused() -> None:
+    site = load_site(shipped("site-racks-small.toml"))
+    check_names(["A left", "B right 2"], site)
+    with pytest.raises(InputError, match=r"racks\.light: no rack front 'C left'; there are A left, A left 1"):
+        check_names(["A left", "C left"], site)
