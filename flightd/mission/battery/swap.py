@@ -101,7 +101,8 @@ class BatterySwap:
         left_m = s.distance_m((goal.x_m, goal.y_m)) if state.phase in _ON_LEG else 0.0
         if math.isinf(left_m):  # no pose
             left_m = 0.0
-        return self._sorties.must_return(goal.node, left_m, goal.speed_mps)
+        speed_mps = min(goal.speed_mps, self._scanner.passing_mps)
+        return self._sorties.must_return(goal.node, left_m, speed_mps)
 
     def _short_of_way(self, s: MissionInputs, state: State) -> bool:
         try:

@@ -185,7 +185,8 @@ class PhaseProgress:
                 way_s = height_m / min(p.land_mps, p.expert.touch_mps, p.expert.touch_blind_mps) + AIM_S
             case Phase.FOLLOW:
                 here_m = s.distance_m((goal.x_m, goal.y_m))
-                way_s = (0.0 if math.isinf(here_m) else here_m) / min(goal.speed_mps, p.speed_mps)
+                speed_mps = min(goal.speed_mps, self._scanner.passing_mps, p.speed_mps)
+                way_s = (0.0 if math.isinf(here_m) else here_m) / speed_mps
             case _:
                 way_s = 0.0
         return p.expert.phase_slack_s + p.expert.phase_share * way_s
