@@ -187,7 +187,8 @@ class CodeRead:
     read from the picture as it is and falls towards 0 with every alteration it took.  `gs1` are the
     (application identifier, value) pairs of a GS1 code or GS1 Digital Link whose check digits hold, and
     `gs1_problem` says what is wrong with one that is none.  `module_px` are the pixels for each of its
-    modules, None where their number is not known.
+    modules, None where their number is not known.  `whole` is False for a weakly checked linear code that may
+    be a part of a longer one: the picture does not show it end in quiet zones.
     """
 
     symbology: str
@@ -199,11 +200,13 @@ class CodeRead:
     gs1: tuple[tuple[str, str], ...] = ()
     gs1_problem: str = ""
     module_px: float | None = None
+    whole: bool = True
 
     @property
     def believed(self) -> bool:
-        """A checksum vouches for it, or two reads agree: never a guess."""
-        return self.sure or self.agreeing >= 2
+        """A checksum vouches for it, or two reads of a whole code agree: never a guess.  Of a part all reads
+        may agree, and all be wrong."""
+        return self.sure or (self.whole and self.agreeing >= 2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,7 @@
-"""Votes of many frames on what a code says: believed when a checksum vouches or two reads agree."""
+"""Votes of many frames on what a code says: believed when a checksum vouches or two whole reads agree.
+
+Frames that show the same label are no independent witnesses: what may be a part of a longer code is misread
+alike in each of them, and counts in none."""
 
 from __future__ import annotations
 
@@ -12,7 +15,8 @@ class CodeVotes:
     """Collects the reads of one location over frames; it never chooses between contradicting texts by luck.
 
     Reads are one code when symbology and text are equal.  Of each code it keeps the best read, the place
-    where it was seen last, and the highest probability that this is in the location.
+    where it was seen last, and the highest probability that this is in the location.  A read that may be a
+    part of a longer code is kept, and is no frame that gives it.
     """
 
     def __init__(self) -> None:
@@ -32,11 +36,13 @@ class CodeVotes:
             known = self._codes.get(code)
             new |= known is None
             self._codes[code] = placed if known is None else _merged(known, placed)
-            self._frames.setdefault(code, set()).add(frame_seq)
+            frames = self._frames.setdefault(code, set())
+            if placed.read.whole or placed.read.sure:
+                frames.add(frame_seq)
         return new
 
     def frames(self, placed: PlacedRead) -> int:
-        """How many frames gave a code."""
+        """How many frames gave a code whole."""
         return len(self._frames.get((placed.read.symbology, placed.read.text), ()))
 
     def believed(self) -> tuple[PlacedRead, ...]:
@@ -54,5 +60,5 @@ class CodeVotes:
 
 def _merged(known: PlacedRead, newest: PlacedRead) -> PlacedRead:
     """One code seen twice."""
-    best = max(known.read, newest.read, key=lambda read: (read.sure, read.quality))
+    best = max(known.read, newest.read, key=lambda read: (read.sure, read.whole, read.quality))
     return replace(newest, read=best, probability=max(known.probability, newest.probability))

@@ -4,9 +4,10 @@ The first look is at the picture as it is, wherever it has edges enough for a co
 perpendicular edges say that one may be (`code_regions`) and none was read, the region is looked at again:
 turned upright, inverted, enlarged, shrunk, with local contrast, sharpened, smoothed.  A read is believed when
 error correction or a checksum vouches for it; a checksum of one digit found in an altered picture, and
-symbologies without any, need a second look that agrees.  Two believed texts at one place contradict each
-other, and then neither counts.  What is still not read and has bars one way is fitted as a blurred EAN-13
-(`blurred_ean`).
+symbologies without any, need a second look that agrees.  A linear code without any that does not end in quiet
+zones (`quiet_zones`) may be a part of a longer one: it is never believed, however many looks agree.  Two
+believed texts at one place contradict each other, and then neither counts.  What is still not read and has
+bars one way is fitted as a blurred EAN-13 (`blurred_ean`).
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from flightd.vision.shelf.crease_flattening import flatten_qr
 from flightd.vision.shelf.digital_link import parse_digital_link
 from flightd.vision.shelf.edge_turn import edges_turn_rad
 from flightd.vision.shelf.gs1 import Gs1Error, parse_element_string
+from flightd.vision.shelf.quiet_zones import ends_in_quiet_zones
 
 
 class _Proof(enum.IntEnum):
@@ -131,6 +133,7 @@ class _Candidate:
     proof: _Proof
     gs1: bool
     corners: Matrix
+    whole: bool = True
     looks: set[int] = field(default_factory=set)
     first_look: int = 0
     unaltered: bool = False
@@ -142,7 +145,7 @@ class _Candidate:
 
     @property
     def believed(self) -> bool:
-        return self.sure or len(self.looks) >= 2
+        return self.sure or (self.whole and len(self.looks) >= 2)
 
     def inside(self, region: CodeRegion) -> bool:
         x, y = self.corners.mean(axis=0)
@@ -176,7 +179,7 @@ def read_codes(picture: Image, *, deeper: bool = True) -> tuple[CodeRead, ...]:
     busy = search.busy()
     for view, picture_from_view in _first_views(grey, busy):
         codes = _scan(view, try_invert=False, try_downscale=busy is None)
-        _collect(found, codes, picture_from_view, 0)
+        _collect(found, grey, codes, picture_from_view, 0)
     if deeper:
         budget = _MOST_PIXELS
         doubtful = [_around(c, grey.shape[1], grey.shape[0]) for c in found if not c.believed]
@@ -260,7 +263,7 @@ def _look_again(
         binarizer = zxingcpp.Binarizer
         chosen = binarizer.GlobalHistogram if look.global_threshold else binarizer.LocalAverage
         codes = _scan(view, chosen, return_errors=True)
-        _collect(found, codes, picture_from_view, number)
+        _collect(found, grey, codes, picture_from_view, number)
         damaged += [(view, picture_from_view, code) for code in codes if _is_damaged_qr(code)][:1]
         if _is_read(region, found, known):
             return budget
@@ -325,7 +328,11 @@ def _view(crop: Image, look: _Look) -> tuple[Image, Matrix]:
 
 
 def _collect(
-    found: list[_Candidate], codes: Iterable[zxingcpp.Barcode], picture_from_view: Matrix, look: int
+    found: list[_Candidate],
+    grey: Image,
+    codes: Iterable[zxingcpp.Barcode],
+    picture_from_view: Matrix,
+    look: int,
 ) -> None:
     for code in codes:
         if not code.valid or not code.text:
@@ -333,14 +340,16 @@ def _collect(
         symbology, text = _named(code)
         corners = _transformed(_corners(code), picture_from_view)
         is_gs1 = code.content_type == zxingcpp.ContentType.GS1
+        proof = _proof(code)
         _add(
             found,
             _Candidate(
                 symbology,
                 text,
-                _proof(code),
+                proof,
                 is_gs1,
                 corners,
+                whole=proof is not _Proof.NONE or _is_whole(code, text, grey, corners),
                 first_look=look,
                 module_px=module_px(code, corners),
             ),
@@ -356,6 +365,7 @@ def _add(found: list[_Candidate], new: _Candidate, look: int) -> None:
         found.append(new)
         known = new
     known.looks.add(look)
+    known.whole |= new.whole
     known.unaltered |= look in {0, 1}
 
 
@@ -376,6 +386,16 @@ def _proof(code: zxingcpp.Barcode) -> _Proof:
     if family in _CORRECTION and name not in _SMALL:
         return _Proof.CORRECTION
     return _Proof.CHECKSUM if family in _CHECKSUM or name in _CHECKED_RETAIL else _Proof.NONE
+
+
+def _is_whole(code: zxingcpp.Barcode, text: str, grey: Image, corners: Matrix) -> bool:
+    """Whether a weakly checked code is no part of a longer one; `text` as it is told."""
+    name = str(code.format)
+    if name in _SMALL:
+        return True
+    if name == "UPC-E" and not text.startswith("0"):
+        return False
+    return ends_in_quiet_zones(grey, corners, name)
 
 
 def _corners(code: zxingcpp.Barcode) -> Matrix:
@@ -428,4 +448,5 @@ def _code_read(candidate: _Candidate, width: int, height: int) -> CodeRead:
         gs1=elements,
         gs1_problem=problem,
         module_px=candidate.module_px,
+        whole=candidate.whole,
     )
