@@ -2,7 +2,7 @@
 
 Each label is seen three times from about the same place under the same light, with 2.75 to 4 pixels for each
 module, and the looks go the product's way to a finding.  Damaged are its ends (torn off, covered, worn, cut
-off by the picture's edge) or any of its bars (a blot, a lamp's image); undamaged ones show what is read at all.
+off by the picture's edge) or any of its bars (a blot, a lamp's image); undamaged ones show what is read.
 
 python -m tools.bench_damage [--labels N] [--seed N] [--list]
 """

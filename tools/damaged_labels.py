@@ -112,7 +112,7 @@ class Printed:
 def upc_a_of(seven: str) -> str:
     """The 12 digits that a UPC-E abbreviates, for its number system and six digits.  Source: GS1 General
     Specifications, 5.2 (zero suppression)."""
-    system, (a, b, c, d, e, last) = seven[0], seven[1:]
+    system, a, b, c, d, e, last = list(seven)
     body = {
         "0": f"{a}{b}{last}0000{c}{d}{e}",
         "1": f"{a}{b}{last}0000{c}{d}{e}",
@@ -201,7 +201,7 @@ class DamagedLabel:
 
     @property
     def _bars_px(self) -> float:
-        return self.drawing.shape[1] - 2.0 * (24 + _QUIET) * _MODULE_PX
+        return float(self.drawing.shape[1]) - 2.0 * (24 + _QUIET) * _MODULE_PX
 
     def _at_px(self, seen: Seen) -> float:
         """Where in the picture the label's middle is."""

@@ -41,6 +41,11 @@ class CodeVotes:
                 frames.add(frame_seq)
         return new
 
+    @property
+    def only_parts(self) -> bool:
+        """Whether codes were read, and each may be a part of a longer one."""
+        return self.any_read and not any(self._frames.values())
+
     def frames(self, placed: PlacedRead) -> int:
         """How many frames gave a code whole."""
         return len(self._frames.get((placed.read.symbology, placed.read.text), ()))

@@ -58,6 +58,11 @@ class LocationVotes:
         return self._votes.any_read
 
     @property
+    def only_parts(self) -> bool:
+        """Whether codes were read here, and each may be a part of a longer one."""
+        return self._votes.only_parts
+
+    @property
     def any_goods(self) -> bool:
         """Whether the place is not empty whatever its middle shows: a code was read here, or most pictures
         show goods in its opening."""

@@ -35,6 +35,7 @@ class Undecided(enum.StrEnum):
     LIGHT = "badly lit"
     UNSURE = "perhaps empty"
     ONCE = "a code that only one view gives"
+    PART = "bars that may go on"
     APART = "codes that no view shows together"
     TORN = "one label read differently"
     NOBODYS = "a code that may be a neighbour's"
@@ -131,7 +132,7 @@ class SweepVotes:
         if self._texts:
             return Undecided.TORN
         if self._votes.any_read:
-            return Undecided.ONCE
+            return Undecided.PART if self._votes.only_parts else Undecided.ONCE
         if len(self._fair_rad) < sweep.unread_views:
             return Undecided.LIGHT if self._unfair else Undecided.UNSEEN
         if self._occupied and self._empty:

@@ -23,12 +23,15 @@ _QUIET: Final = {"UPC-E": (9.0, 7.0), "EAN-8": (7.0, 7.0)}
 """Blank modules on the code's own left and right.  Source: ISO/IEC 15420."""
 _OTHERS_QUIET: Final = (10.0, 10.0)
 """ITF (ISO/IEC 16390), Code 39 (ISO/IEC 16388), Codabar (EN 798), in their narrow elements."""
-_ELEMENT_MODULES: Final = 1.5
-"""Mean width of a bar or space of these, 1.4 to 1.6 for wide elements of two to three modules."""
+_ELEMENT_MODULES: Final = {"ITF": 1.7}
+_OTHERS_ELEMENT_MODULES: Final = 1.5
+"""Mean width of a bar or space of these: 1.4 to 1.8 in ITF for wide ones of two to three modules, in the
+others 1.3 to 1.6."""
 _KEPT: Final = 0.8
 """Part of its quiet zone that a printed label must have kept."""
-_BEYOND_END: Final = 0.75
-"""Modules at the zone's inner end in which the last bar's blur, or an end told too short, may show."""
+_SHORT_MODULES: Final = 2.0
+"""So far behind the end that is told the last bar and its blur may still show: where it leans in a blurred
+picture, one end is told up to a module and a half too short."""
 _ROWS: Final = 7
 _LEAST_TALL_MODULES: Final = 3.0
 """A read may be told as thin as one row, bars are much taller."""
@@ -37,7 +40,7 @@ _LEAST_CONTRAST: Final = 12.0
 _MOST_DIP: Final = 0.3
 """Part of the code's contrast: a box of the colour of cardboard beside white paper is a dip of 0.4 and more,
 a bar of one module seen through the blur at which codes are still read one of 0.4."""
-_NEAR_MODULES: Final = 20
+_NEAR_MODULES: Final = 35
 """How much of a code's end tells the paper's level beside it."""
 _STEPS: Final = 4
 """Samples for each module."""
@@ -51,7 +54,7 @@ def ends_in_quiet_zones(grey: Image, corners: Matrix, symbology: str) -> bool:
     width_px = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
     if width_px < 1.0:
         return False
-    modules = _MODULES.get(symbology) or _modules_of(grey, ends, width_px)
+    modules = _MODULES.get(symbology) or _modules_of(grey, ends, width_px, symbology)
     if modules <= 0.0:
         return False
     ends = _rows_ends(corners, _LEAST_TALL_MODULES * width_px / modules)
@@ -86,21 +89,25 @@ def _sampled(grey: Image, ends: Matrix, begin: float, end: float, count: int) ->
 
 
 def _zone(grey: Image, ends: Matrix, quiet: float, modules: float) -> _Values:
-    """(rows, samples) of what is to be blank behind the second end of each row."""
-    begin, end = 1.0 + _BEYOND_END / modules, 1.0 + _KEPT * quiet / modules
-    return _sampled(grey, ends, begin, end, round((_KEPT * quiet - _BEYOND_END) * _STEPS))
+    """(rows, samples) of what is to be blank, outwards from the second end of each row."""
+    wide = _KEPT * quiet
+    return _sampled(grey, ends, 1.0, 1.0 + wide / modules, round(wide * _STEPS))
 
 
 def _is_blank(zone: _Values, inside: _Values) -> NDArray[np.bool_]:
-    """(rows,) whether a zone is nowhere darker than the paper between the bars beside it, nor dips."""
-    dark, light = np.percentile(inside, (10, 90), axis=1)
+    """(rows,) whether a zone, its last bar aside, is nowhere darker than the paper between the bars beside
+    it, nor dips."""
+    dark, light = np.percentile(inside, (5, 95), axis=1)
     contrast = light - dark
     brightest = np.maximum(light, np.percentile(zone, 90, axis=1))
     # what lies outside of the picture is NaN, and no comparison with that holds
-    return np.asarray((zone.min(axis=1) >= brightest - _MOST_DIP * contrast) & (contrast >= _LEAST_CONTRAST))
+    is_paper = zone >= (brightest - _MOST_DIP * contrast)[:, None]
+    begin = is_paper.argmax(axis=1)
+    blank = is_paper.sum(axis=1) == zone.shape[1] - begin
+    return np.asarray(blank & (begin <= _SHORT_MODULES * _STEPS) & (contrast >= _LEAST_CONTRAST))
 
 
-def _modules_of(grey: Image, ends: Matrix, width_px: float) -> float:
+def _modules_of(grey: Image, ends: Matrix, width_px: float, symbology: str) -> float:
     """About how many modules wide a code is by the number of its bars."""
     profile = np.median(_sampled(grey, ends, 0.0, 1.0, 2 * round(width_px)), axis=0)
     if np.isnan(profile).any():
@@ -108,4 +115,5 @@ def _modules_of(grey: Image, ends: Matrix, width_px: float) -> float:
     dark, light = np.percentile(profile, (10, 90))
     smooth = cv2.blur(profile[None].astype(np.float32), (3, 1))[0]
     is_bar = smooth < (dark + light) / 2
-    return _ELEMENT_MODULES * (1 + np.count_nonzero(np.diff(is_bar.astype(np.int8))))
+    mean = _ELEMENT_MODULES.get(symbology, _OTHERS_ELEMENT_MODULES)
+    return mean * (1 + np.count_nonzero(np.diff(is_bar.astype(np.int8))))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flightd.core.types import CodeRead
 from flightd.mission.scan.code_assignment import PlacedRead
 from flightd.mission.scan.code_votes import CodeVotes
@@ -37,3 +39,26 @@ def test_the_best_read_is_kept_with_the_newest_place_and_the_highest_probability
     votes.add(2, [placed("A", sure=True, quality=0.4, x_m=1.1, probability=0.991)])
     (code,) = votes.believed()
     assert (code.read.quality, code.x_m, code.probability, code.read.agreeing) == (0.9, 1.1, 0.999, 2)
+
+
+def test_what_may_be_a_part_of_a_longer_code_is_seen_and_never_believed() -> None:
+    """Half of a damaged EAN-13 is the same UPC-E in every view."""
+    votes, half = CodeVotes(), placed("109481000094", sure=False, quality=0.9)
+    part = replace(half, read=replace(half.read, agreeing=3, whole=False))
+    for frame in range(5):
+        votes.add(frame, [part])
+    assert votes.any_read
+    assert votes.only_parts
+    assert votes.believed() == ()
+    assert votes.frames(part) == 0
+
+
+def test_a_code_is_believed_by_the_frames_that_show_it_whole() -> None:
+    votes, whole = CodeVotes(), placed("070429", sure=False, quality=0.4)
+    part = replace(whole, read=replace(whole.read, agreeing=2, quality=0.9, whole=False))
+    votes.add(1, [part])
+    votes.add(2, [whole])
+    assert not votes.only_parts
+    assert votes.believed() == (), "one frame shows it whole"
+    votes.add(3, [whole])
+    assert [(code.read.text, code.read.agreeing) for code in votes.believed()] == [("070429", 2)]

@@ -98,6 +98,18 @@ def test_half_a_code_at_the_pictures_edge_does_not_make_another_of_its_label() -
     assert verdict([whole, whole, whole, [placed("P2")]]) is Undecided.TORN, "vouched for, too"
 
 
+def test_what_may_be_a_part_of_a_longer_code_is_left_for_a_stop_and_is_unreadable_there() -> None:
+    part = replace(placed("109481000094", sure=False), read=replace(UNSURE_READ, agreeing=3, whole=False))
+    assert verdict([[part]] * 6) is Undecided.PART
+    stop = LocationVotes(CODE, "A2", PARAMS.pictures)
+    for seq in range(6):
+        stop.add(seq, pose(seq), PlaceLook(CODE, QUAD, 1.0, GOODS, f"picture {seq}"), [part])
+        assert stop.finding(final=False) is None
+    found = stop.finding(final=True)
+    assert found is not None
+    assert (found.state, found.reads) == (LocationState.UNREADABLE, ())
+
+
 def test_a_neighbours_goods_in_a_cut_off_view_leave_an_empty_place_empty() -> None:
     def seen(*views: tuple[float, Occupancy]) -> LocationState | Undecided:
         votes = SweepVotes(CODE, "A2", PARAMS, 1.0)

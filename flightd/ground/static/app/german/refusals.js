@@ -308,6 +308,7 @@ export default {
   "badly lit": "schlecht beleuchtet",
   "perhaps empty": "vielleicht leer",
   "a code that only one view gives": "ein Code, den nur ein Blick zeigt",
+  "bars that may go on": "Striche, die weitergehen können",
   "codes that no view shows together": "Codes, die kein Blick zusammen zeigt",
   "one label read differently": "ein Etikett verschieden gelesen",
   "a code that may be a neighbour's": "ein Code, der einem Nachbarn gehören kann",
