@@ -15,6 +15,7 @@ from flightd.sim.racks.label_paper import stick
 from flightd.sim.racks.stock import Condition, Label
 from flightd.vision.shelf.code_reader import read_codes
 from flightd.vision.shelf.quiet_zones import ends_in_quiet_zones
+from tools.bench_damage import told_of
 from tools.damaged_labels import Damage, DamagedLabel, Kind, Printed, Seen, upc_a_of
 
 PAPER, INK, CARDBOARD = 232, 28, 145
@@ -86,6 +87,15 @@ def test_no_damage_to_a_long_code_makes_a_short_one(kind: Kind, damage: Damage) 
         rng = np.random.default_rng([seed, len(damage)])
         label = DamagedLabel.drawn(Printed.drawn(kind, rng), damage, rng)
         assert weak(label.picture(Seen.drawn(rng), rng)) == []
+
+
+@pytest.mark.parametrize(("damage", "seed"), [(Damage.CUT, 1), (Damage.TORN, 2), (Damage.WORN, 0)])
+def test_a_line_that_leaves_tilted_bars_by_their_tips_reads_no_short_itf(damage: Damage, seed: int) -> None:
+    """Beyond the tips it meets paper as blank as a quiet zone, in three views alike."""
+    order = list(Kind).index(Kind.ITF), list(Damage).index(damage)
+    rng = np.random.default_rng([1, *order, seed])
+    told = told_of(DamagedLabel.drawn(Printed.drawn(Kind.ITF, rng), damage, rng), rng)
+    assert told.wrong == ()
 
 
 @pytest.mark.parametrize("px", [2.75, 3.3, 4.0])
