@@ -32,6 +32,12 @@ from flightd.vision.shelf.edge_turn import edges_turn_rad
 from flightd.vision.shelf.gs1 import Gs1Error, parse_element_string
 from flightd.vision.shelf.quiet_zones import ends_in_quiet_zones
 
+_UNASKED = frozenset((zxingcpp.BarcodeFormat.Code39, zxingcpp.BarcodeFormat.Code32))
+"""Code 32 is another writing of a Code 39 of six characters: by chance, every tenth of these would be told as
+one.  The first means all kinds of Code 39, which are asked for each."""
+_READABLE = zxingcpp.barcode_formats_list(zxingcpp.BarcodeFormats(zxingcpp.BarcodeFormat.AllReadable))
+_FORMATS = zxingcpp.BarcodeFormats([one for one in _READABLE if one not in _UNASKED])
+
 
 class _Proof(enum.IntEnum):
     """What stands behind a read of a symbology."""
@@ -217,6 +223,7 @@ def _scan(
         return []
     codes = zxingcpp.read_barcodes(
         grey,
+        formats=_FORMATS,
         text_mode=zxingcpp.TextMode.Plain,
         binarizer=binarizer,
         try_invert=try_invert,

@@ -55,6 +55,8 @@ def texts(picture: Image) -> list[str]:
         ("Code128", "005-3379497200006"),
         ("Code93", "BAY93"),
         ("Code39", "001EC947D49B"),
+        ("Code39", "P65754"),  # a Code 32, too, by its check digit
+        ("Code39Ext", "ab12"),
         ("ITF", "30885909173820"),
         ("EAN13", "9780679601050"),
         ("EAN8", "96385074"),
