@@ -35,8 +35,11 @@ from flightd.vision.shelf.quiet_zones import ends_in_quiet_zones
 _UNASKED = frozenset((zxingcpp.BarcodeFormat.Code39, zxingcpp.BarcodeFormat.Code32))
 """Code 32 is another writing of a Code 39 of six characters: by chance, every tenth of these would be told as
 one.  The first means all kinds of Code 39, which are asked for each."""
-_READABLE = zxingcpp.barcode_formats_list(zxingcpp.BarcodeFormats(zxingcpp.BarcodeFormat.AllReadable))
-_FORMATS = zxingcpp.BarcodeFormats([one for one in _READABLE if one not in _UNASKED])
+_FORMATS = tuple(
+    one
+    for one in zxingcpp.barcode_formats_list(zxingcpp.BarcodeFormats(zxingcpp.BarcodeFormat.AllReadable))
+    if one not in _UNASKED
+)
 
 
 class _Proof(enum.IntEnum):
@@ -223,7 +226,7 @@ def _scan(
         return []
     codes = zxingcpp.read_barcodes(
         grey,
-        formats=_FORMATS,
+        formats=zxingcpp.BarcodeFormats(_FORMATS),
         text_mode=zxingcpp.TextMode.Plain,
         binarizer=binarizer,
         try_invert=try_invert,
