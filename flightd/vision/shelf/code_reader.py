@@ -55,6 +55,8 @@ _CORRECTION = frozenset(("QR Code", "Data Matrix", "Aztec", "PDF417", "MaxiCode"
 _CHECKSUM = frozenset(("Code 128", "Code 93", "DataBar"))
 _SMALL = frozenset(("Micro QR Code", "Aztec Rune"))
 """Too small to carry enough of it."""
+_FRAMED = frozenset(("Code 39", "Code 39 Standard", "Code 39 Extended", "Pharmazentralnummer"))
+"""They begin and end with a character that their text may not have: no part of one is another one."""
 _CHECKED_RETAIL = frozenset(("EAN-13", "UPC-A"))
 """Everything else (ITF, Code 39, Codabar, the short UPC-E and EAN-8, ...) is easily misread in parts."""
 
@@ -401,7 +403,7 @@ def _proof(code: zxingcpp.Barcode) -> _Proof:
 def _is_whole(code: zxingcpp.Barcode, text: str, grey: Image, corners: Matrix) -> bool:
     """Whether a weakly checked code is no part of a longer one; `text` as it is told."""
     name = str(code.format)
-    if name in _SMALL:
+    if name in _SMALL or name in _FRAMED:
         return True
     if name == "UPC-E" and not text.startswith("0"):
         return False

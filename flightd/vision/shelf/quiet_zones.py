@@ -25,7 +25,7 @@ _MODULES: Final = {"UPC-E": 51, "EAN-8": 67}
 _QUIET: Final = {"UPC-E": (9.0, 7.0), "EAN-8": (7.0, 7.0)}
 """Blank modules on the code's own left and right.  Source: ISO/IEC 15420."""
 _OTHERS_QUIET: Final = (10.0, 10.0)
-"""ITF (ISO/IEC 16390), Code 39 (ISO/IEC 16388), Codabar (EN 798), in their narrow elements."""
+"""ITF (ISO/IEC 16390), Codabar (EN 798), in their narrow elements."""
 _ELEMENT_MODULES: Final = {"ITF": 1.7}
 _OTHERS_ELEMENT_MODULES: Final = 1.5
 """Mean width of a bar or space of these: 1.4 to 1.8 in ITF for wide ones of two to three modules, in the
