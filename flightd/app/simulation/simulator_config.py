@@ -10,11 +10,12 @@ from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
+from flightd.config.camera import OpticsSection
 from flightd.config.paths import shipped
 from flightd.config.schema import Config, load_table, parse_config
 from flightd.core.errors import InputError
 from flightd.sim.random_sites import random_site
-from flightd.sim.scenario.scenario import Scenario
+from flightd.sim.scenario.scenario import CameraScenario, FrontCameraScenario, Scenario
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
 
@@ -54,6 +55,9 @@ def simulator_config(
     if site.locations and config.vehicle.kind != "ardrone" and not config.front_camera.is_fitted:
         _lay(table, "front_camera.url", _FRONT_CAMERA_URL)
         config = parse_config(table, path)
+    _demand_size("camera", config.camera, scenario.camera)
+    if config.front_camera.is_fitted:
+        _demand_size("front_camera", config.front_camera, scenario.front_camera)
     return config, site
 
 
@@ -62,6 +66,20 @@ def _hang_lamp(table: dict[str, Any]) -> None:
     front, vehicle = table.get("front_camera"), table.get("vehicle", {})
     if isinstance(front, dict) and front.get("lamp") and isinstance(vehicle, dict):
         front["lamp"] = _LAMPS.get(vehicle.get("kind", "ardupilot"), "")
+
+
+def _demand_size(
+    section: str, expected: OpticsSection, simulated: CameraScenario | FrontCameraScenario
+) -> None:
+    """InputError where the daemon would wait for pictures of another size than the simulated camera takes."""
+    for key in ("width_px", "height_px"):
+        wanted, taken = getattr(expected, key), getattr(simulated, key)
+        if wanted != taken:
+            raise InputError(
+                f"{wanted}, but the simulated camera takes pictures of {taken}",
+                key=f"{section}.{key}",
+                remedy=f"give {key} = {wanted} in [{section}] of a scenario (--scenario FILE) instead",
+            )
 
 
 def _site(config: Config, warehouse: str | None) -> Site:

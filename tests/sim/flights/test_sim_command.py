@@ -99,6 +99,17 @@ def test_a_bare_word_for_a_number_is_still_refused() -> None:
         simulator_config(None, None, Scenario(), ["mission.height_m=high"])
 
 
+@pytest.mark.parametrize("key", ["camera.width_px", "front_camera.height_px"])
+def test_a_picture_size_that_no_simulated_camera_takes_is_refused(key: str) -> None:
+    section, name = key.split(".")
+    remedy = rf"{section}\.{name}: 320, .* in \[{section}\] of a scenario"
+    with pytest.raises(InputError, match=remedy):
+        simulator_config(None, str(ROOT / "configs" / "site-racks-small.toml"), Scenario(), [f"{key}=320"])
+    simulated = Scenario.model_validate({section: {name: 320}})
+    config, _ = simulator_config(None, None, simulated, [f"{key}=320"])
+    assert getattr(getattr(config, section), name) == 320
+
+
 def test_a_node_to_which_the_route_comes_twice_is_one_node() -> None:
     site = load_site(CONFIGS / "site-demo.toml")
     told: list[Snapshot] = []
