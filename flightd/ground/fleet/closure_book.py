@@ -4,7 +4,6 @@ station."""
 from __future__ import annotations
 
 import asyncio
-import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -14,8 +13,6 @@ from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.fleet.traffic.closures import Closure
 from flightd.ground.fleet.fleet_memory import FleetMemory, KeptClosure
 from flightd.ground.fleet.station_traffic import Aside
-
-_LOG = logging.getLogger(__name__)
 
 
 class ClosureBook:
@@ -37,18 +34,17 @@ class ClosureBook:
         return tuple(one.closure for one in self._closed.values())
 
     async def recall(self) -> None:
-        """Read what is kept, once."""
+        """Read what is kept, once.  UnavailableError or InputError where that cannot be read: then nobody
+        knows what is closed."""
         async with self._changes:
             if not self._is_recalled and self._memory is not None:
-                try:
-                    kept = await self._aside(self._memory.closures)
-                    self._closed = {one.closure.name: one for one in kept}
-                except FlightdError as err:
-                    _LOG.error("what people closed is not known any more, and open: %s", err)
+                kept = await self._aside(self._memory.closures)
+                self._closed = {one.closure.name: one for one in kept}
             self._is_recalled = True
 
     async def close(self, closure: Closure, by: str) -> None:
-        """From now on.  UnavailableError where it is closed and cannot be written down."""
+        """From now on.  UnavailableError where it is closed and cannot be written down; errors as of
+        `recall`."""
         await self.recall()
         async with self._changes:
             self._closed[closure.name] = KeptClosure(closure, by, self._utc_s())
@@ -56,7 +52,7 @@ class ClosureBook:
 
     async def open(self, name: str) -> None:
         """InputError where nothing is closed by that name, UnavailableError where it is open and cannot be
-        written down."""
+        written down; errors as of `recall`."""
         await self.recall()
         async with self._changes:
             if self._closed.pop(name, None) is None:

@@ -134,7 +134,7 @@ class OwnFleet(VehicleSides):
     async def _control(self) -> None:
         loop = asyncio.get_running_loop()
         try:
-            await self._closures.recall()
+            await self._recall_closures()
             await self._recall()
         finally:
             self._hear_all()
@@ -163,6 +163,20 @@ class OwnFleet(VehicleSides):
             await self._compare()
         elif not self._traffic.is_outdated:
             self._trouble = ""
+
+    async def _recall_closures(self) -> None:
+        """Nobody is flown before it is known what people closed: they may be in there."""
+        while True:
+            try:
+                await self._closures.recall()
+            except FlightdError as err:
+                trouble = f"what people closed cannot be read: {err}"
+            else:
+                return
+            if self._trouble != trouble:
+                _LOG.error("the fleet does not fly: %s", trouble)
+            self._trouble = trouble
+            await asyncio.sleep(_AGAIN_S)
 
     async def _recall(self) -> None:
         """Go on where the station before was ended, if it flew the same drones."""

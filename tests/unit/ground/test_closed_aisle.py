@@ -216,6 +216,31 @@ def test_what_cannot_be_kept_is_closed_and_told(tmp_path: Path, monkeypatch: pyt
     fly(go, "ab", memory=FleetMemory(tmp_path))
 
 
+def test_nobody_is_flown_before_it_is_known_what_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuses(*_: object) -> None:
+        raise UnavailableError("the file is locked")
+
+    async def go(fleet: PaperFleet) -> None:
+        await fleet.own.close("ann", aisle="A")
+        await fleet.kill()
+        with monkeypatch.context() as locked:
+            locked.setattr(FleetMemory, "closures", refuses)
+            fleet.start_again()
+            await asyncio.sleep(30.0)
+            assert not fleet.state["flies"]
+            assert fleet.state["trouble"] == "what people closed cannot be read: the file is locked"
+            with pytest.raises(UnavailableError, match="the file is locked"):
+                await fleet.own.open("A")
+        await until(lambda: fleet.state["flies"], 60)
+        assert closure(fleet)["name"] == "A"
+        fleet.own.ask(["A3", "B3"])
+        await until(lambda: fleet.state["done"] == ["B3"], 200)
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
 def test_what_lies_behind_what_is_closed_is_told_and_flown_once_that_is_open() -> None:
     async def go(fleet: PaperFleet) -> None:
         await fleet.own.close("ann", nodes=["A2", "A3"])

@@ -681,6 +681,7 @@ export default {
   "{names} did not tell yet where it stands on the ground": "{names}: noch nicht gesagt, wo sie am Boden steht",
   "no drone of the fleet is called {name}": "keine Drohne der Flotte heißt {name}",
   "the fleet does not fly: {why}": "die Flotte fliegt nicht: {why}",
+  "what people closed cannot be read: {why}": "was Menschen gesperrt haben, ist nicht lesbar: {why}",
   "it failed: {why}": "gescheitert: {why}",
   "the station flies no fleet": "die Station fliegt keine Flotte",
   "start it with --fleet": "starten Sie sie mit --fleet",
