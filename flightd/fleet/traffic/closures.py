@@ -84,11 +84,15 @@ class ClosedAir:
         """The vertices from which a way leads to this one over lanes that are open."""
         found = self._ways_home.get(home)
         if found is None:
-            found = self._ways_home[home] = self._leading_to(home)
+            found = self._ways_home[home] = self._leading_to(home, frozenset().union(*self.zones))
         return found
 
-    def _leading_to(self, home: int) -> frozenset[int]:
-        shut = frozenset().union(*self.zones)
+    def comes_home(self, air: Collection[int], start: int, home: int) -> bool:
+        """Whether a way leads who may be in this air from the vertex `start` to this one: he may leave the
+        zones in which he is."""
+        return start in self.leads_to(home) or start in self._leading_to(home, self.shut_for(air))
+
+    def _leading_to(self, home: int, shut: Collection[int]) -> frozenset[int]:
         onto: list[list[int]] = [[] for _ in self._lanes.vertices]
         for vertex, arcs in enumerate(self._lanes.arcs):
             for arc in arcs:

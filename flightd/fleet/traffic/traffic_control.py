@@ -398,9 +398,10 @@ class TrafficControl:
         return self.closed.within(airs)
 
     def is_cut_off(self, drone: str) -> bool:
-        """Whether no way leads to its pad but through what is closed."""
+        """Whether no way leads to its pad but through what is closed, what it is in and leaves left out."""
         course = self.drones[drone]
-        return all(course.place not in self.closed.leads_to(end) for end in course.ends)
+        here = _end_of(course)
+        return not any(self.closed.comes_home(course.air, here, end) for end in course.ends)
 
     def doubt(self, drone: str, doubt_m: float, now_ms: int) -> None:
         """A drone may be so far beside where it should be, beyond what its cell allows for; 0: it is sure."""

@@ -54,6 +54,19 @@ def test_who_is_in_a_closed_aisle_leaves_by_the_nearer_end_wherever_it_lives(at:
     assert floor.at("d0") == "pad P1"
 
 
+def test_who_leaves_what_is_closed_is_not_cut_off_but_by_something_else_that_is() -> None:
+    floor = Floor(4)
+    control = floor.control
+    assert floor.give("d0", "A4")
+    floor.until("d0", "A4")
+    control.close("A", floor.lanes.lanes_between(BY_A), floor.now_ms)
+    assert not control.is_cut_off("d0")
+    control.close("its pad", floor.lanes.lanes_between([("DAA1", "DAA2")]), floor.now_ms)
+    assert control.is_cut_off("d0")
+    control.open("its pad")
+    assert not control.is_cut_off("d0")
+
+
 def test_who_finds_the_nearer_end_taken_leaves_by_the_other_one() -> None:
     floor = Floor(4)
     assert floor.control.give("d1", (), [floor.lanes.over("A2")], 0)
