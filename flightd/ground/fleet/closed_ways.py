@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+
+import msgspec
 
 from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import InputError
@@ -36,6 +38,15 @@ def closure_between(floor: FloorStatus, nodes: Sequence[str]) -> Closure:
         raise InputError("no way leads between these nodes")
     name = ", ".join(chosen)
     return Closure(name, tuple(sorted(ways)), f"what is between {name} is closed")
+
+
+def check_on_map(floor: FloorStatus, closures: Iterable[Closure]) -> None:
+    """InputError for a closure of which a way is on no line of this map, blocked ones among them: what it
+    closed may be flown over other nodes there."""
+    lines = open_ways(msgspec.structs.replace(floor, ways=()))
+    for closure in closures:
+        if not lines.issuperset(closure.ways):
+            raise InputError(f"{closure.why}, but on another map", remedy="open it, and close it again")
 
 
 def _neighbours(floor: FloorStatus) -> Mapping[str, set[str]]:

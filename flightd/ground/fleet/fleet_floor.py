@@ -72,6 +72,7 @@ class FleetFloor:
                     f"{first} and {other} fly by different maps: {floors[first].name}, {floors[other].name}",
                     remedy="give both the same site file, but for their pads",
                 )
+        self.map = with_all_pads([*floors.values()])
         self.nodes = floors[first].nodes
         self.racks = floors[first].racks
         self.pads = {drone: own_pad(drone, floor, stands[drone]) for drone, floor in floors.items()}
@@ -178,6 +179,13 @@ class FleetFloor:
 def _apart_m(box: Box, at: tuple[float, float]) -> float:
     x_m, y_m = at
     return math.hypot(max(box.x0_m - x_m, x_m - box.x1_m, 0.0), max(box.y0_m - y_m, y_m - box.y1_m, 0.0))
+
+
+def with_all_pads(floors: Sequence[FloorStatus]) -> FloorStatus:
+    """The first map, with the pads of all that are the same but for pads."""
+    like = _without_pads(floors[0])
+    pads = (pad for floor in floors if _without_pads(floor) == like for pad in floor.pads)
+    return msgspec.structs.replace(floors[0], pads=tuple(dict.fromkeys(pads)))
 
 
 def _without_pads(floor: FloorStatus) -> FloorStatus:

@@ -20,10 +20,10 @@ from flightd.fleet.traffic.work_queue import WorkQueue
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.fleet.base_orders import VERSION
-from flightd.ground.fleet.closed_ways import aisle_closure, closure_between
+from flightd.ground.fleet.closed_ways import aisle_closure, check_on_map, closure_between
 from flightd.ground.fleet.closure_book import ClosureBook
 from flightd.ground.fleet.fleet_drone import FleetDrone
-from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor
+from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor, with_all_pads
 from flightd.ground.fleet.fleet_memory import FleetMemory, KeptDrone, KeptFleet, KeptFloor
 from flightd.ground.fleet.station_traffic import Aside, StationTraffic, pace_of
 from flightd.ground.hub import Hub
@@ -196,13 +196,19 @@ class OwnFleet(VehicleSides):
             _LOG.warning("the fleet had other drones before: it flies once all told where they stand")
             return
         stands = {name: standing.node for name, standing in floor.standings.items()}
-        made = await self._aside(partial(FleetFloor, floor.floors, stands, self._cell))
+        made = await self._made(floor.floors, stands)
         drones = self._drones_on(made)
         for name, drone in drones.items():
             drone.recall(fleet.drones[name])
             drone.may_start = floor.floors[name].unattended_start
         self._compared, self._queue = dict(floor.floors), WorkQueue.of(fleet.work)
         await self._begin(made, drones, pace_of(floor.standings.values()))
+
+    async def _made(self, floors: Mapping[str, FloorStatus], stands: Mapping[str, str]) -> FleetFloor:
+        """InputError where they cannot be flown on it, or not all that is closed is there."""
+        floor = await self._aside(partial(FleetFloor, floors, stands, self._cell))
+        check_on_map(floor.map, self._closures.closures)
+        return floor
 
     def _drones_on(self, floor: FleetFloor) -> dict[str, FleetDrone]:
         return {
@@ -252,7 +258,7 @@ class OwnFleet(VehicleSides):
         self._compared = floors
         stands = {name: standing.node for name, standing in standings.items()}
         try:
-            floor = await self._aside(partial(FleetFloor, floors, stands, self._cell))
+            floor = await self._made(floors, stands)
         except InputError as err:
             if self._trouble != str(err):
                 _LOG.warning(
@@ -295,11 +301,13 @@ class OwnFleet(VehicleSides):
 
     @property
     def _floor(self) -> FloorStatus:
-        told = (drone.floor for drone in self._drones.values())
-        floor = next((floor for floor in (*self._compared.values(), *told) if floor is not None), None)
-        if floor is None:
+        """By which they are flown, or will be."""
+        if self._fleet is not None:
+            return self._fleet[0].map
+        told = [drone.floor for drone in self._drones.values() if drone.floor is not None]
+        if not told:
             raise UnavailableError("no drone told its map yet")
-        return floor
+        return with_all_pads(told)
 
     async def close(self, by: str, *, aisle: str = "", nodes: Sequence[str] = ()) -> str:
         """Have nobody fly in an aisle, or between these nodes, until somebody opens that by the name that is

@@ -18,10 +18,13 @@ from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.adapters.ground_link.messages.floor import FloorWay
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import CommandKind, Phase
-from flightd.ground.fleet.closed_ways import aisle_closure, closure_between
-from flightd.ground.fleet.fleet_memory import FILE, FleetMemory
+from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.closures import Closure
+from flightd.ground.fleet.closed_ways import aisle_closure, check_on_map, closure_between
+from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor, with_all_pads
+from flightd.ground.fleet.fleet_memory import FILE, FleetMemory, KeptClosure
 from flightd.ground.messages import Act
-from tests.rigs.paper_drones import hall
+from tests.rigs.paper_drones import PADS, hall
 from tests.rigs.paper_fleet import PaperFleet, fly, on_way_to, until
 from tests.unit.ground.test_fleet_restart import at_rest, until_done
 
@@ -241,6 +244,23 @@ def test_nobody_is_flown_before_it_is_known_what_is_closed(
     fly(go, memory=FleetMemory(tmp_path))
 
 
+def test_nobody_is_flown_by_a_map_that_lacks_what_is_closed(tmp_path: Path) -> None:
+    memory = FleetMemory(tmp_path)
+
+    async def go(fleet: PaperFleet) -> None:
+        await fleet.kill()
+        before = Closure("A", (("A2", "A2b"), ("A2b", "A3")), "aisle A is closed")
+        memory.keep_closures((KeptClosure(before, "ann", 0.0),))
+        fleet.start_again()
+        await asyncio.sleep(30.0)
+        assert not fleet.state["flies"]
+        assert fleet.state["trouble"].startswith("aisle A is closed, but on another map")
+        await fleet.own.open("A")
+        await until(lambda: fleet.state["flies"], 10)
+
+    fly(go, memory=memory)
+
+
 def test_what_lies_behind_what_is_closed_is_told_and_flown_once_that_is_open() -> None:
     async def go(fleet: PaperFleet) -> None:
         await fleet.own.close("ann", nodes=["A2", "A3"])
@@ -302,8 +322,27 @@ def test_what_is_not_there_is_refused_and_a_pads_own_way_is_not_of_its_aisle() -
     with pytest.raises(InputError, match="but to pads"):
         aisle_closure(spur, "A")
 
+    b2_b4 = aisle_closure(floor, "B")
+    check_on_map(msgspec.structs.replace(floor, ways=(FloorWay("B2", "B3", closed=True),)), [b2_b4])
+    nodes = tuple(node for node in floor.nodes if node.id != "B3")
+    with pytest.raises(InputError, match="aisle B is closed, but on another map"):
+        check_on_map(msgspec.structs.replace(floor, nodes=nodes), [b2_b4])
+
     async def go(fleet: PaperFleet) -> None:
         with pytest.raises(InputError, match="nothing is closed that is called A"):
             await fleet.own.open("A")
 
     fly(go, "a")
+
+
+def test_every_drone_comes_home_out_of_a_closed_aisle_where_each_map_has_its_own_pad_alone() -> None:
+    floors = [floor_status(hall(drone)) for drone in "abc"]
+    alone = [
+        msgspec.structs.replace(floor, pads=tuple(pad for pad in floor.pads if pad.id == "home"))
+        for floor in floors
+    ]
+    made = FleetFloor(dict(zip("abc", alone, strict=True)), PADS, CellSize(upright_m=WHOLE_AIR_M))
+    assert aisle_closure(made.map, "B") == aisle_closure(floors[0], "B")
+    assert aisle_closure(alone[0], "B").ways == (("B1", "B2"), ("B2", "B3"), ("B3", "B4"), ("B4", "B5"))
+    elsewhere = msgspec.structs.replace(alone[1], name="shed")
+    assert with_all_pads([alone[0], elsewhere, alone[2]]).pads == (*alone[0].pads, *alone[2].pads)

@@ -689,6 +689,8 @@ export default {
   "work by value": "Arbeit nach Wert",
   "how old counts are is in the ground store, and there is none": "wie alt Zählungen sind, steht im Bodenspeicher, und es gibt keinen",
   "no node is called {name}": "kein Knoten heißt {name}",
+  "{why}, but on another map": "{why}, aber auf einer anderen Karte",
+  "open it, and close it again": "öffnen Sie das, und sperren Sie es wieder",
   "aisle {name} is closed": "Gang {name} ist gesperrt",
   "what is between {names} is closed": "was zwischen {names} ist, ist gesperrt",
   "no aisle is called {name}": "kein Gang heißt {name}",
