@@ -59,7 +59,7 @@ class ChosenPlans:
             wanted = tuple(sorted(wanted, key=lambda node: place.get(node, len(place))))
         ends, yaw_rad = (first.start, first.home), first.start_yaw_rad
         plan = make_plan(self._site, wanted, *ends, self._policy, yaw_rad, waits=waits)
-        far = self._sorties(levels, plan).out_of_reach(wanted)
+        far = self._sorties(levels, by_stopping=waits).out_of_reach(wanted)
         if far:
             raise InputError(
                 f"a full battery does not reach {_listed(far)}, last for the stop there and come back with"
@@ -68,12 +68,19 @@ class ChosenPlans:
         return plan
 
     def estimate(
-        self, plan: FlightPlan, levels: Sequence[int], charge: float, rate_per_s: float
+        self,
+        plan: FlightPlan,
+        levels: Sequence[int],
+        charge: float,
+        rate_per_s: float,
+        *,
+        by_stopping: bool = False,
     ) -> PlannedFlight:
         """What flying a plan takes, from a battery of that `charge` (0..1) on, `rate_per_s` of a full one
-        being used in each second in the air.  Each view of a shelf is looked from once, for its longest."""
+        being used in each second in the air, and nothing counted in passing if `by_stopping`.  Each view of a
+        shelf is looked from once, for its longest."""
         nodes = tuple(stop.node for stop in plan.stops if stop.visit)
-        sorties = self._sorties(levels, plan)
+        sorties = self._sorties(levels, by_stopping=by_stopping)
         way, site = [plan.start, *(stop.node for stop in plan.stops)], self._site
         metres = sum(site.length_m(site.path(a, b)) for a, b in itertools.pairwise(way))
         ways_s = WaysOfPlan.of(site, plan, self._pace)
@@ -88,11 +95,11 @@ class ChosenPlans:
             batteries=flown.batteries,
             charge=charge,
             battery_s=(1.0 - self._battery.reserve) / rate_per_s,
-            sweeps=() if plan.waits else self._scanner.told_sweeps(dict.fromkeys(nodes), levels),
+            sweeps=() if by_stopping else self._scanner.told_sweeps(dict.fromkeys(nodes), levels),
         )
 
-    def _sorties(self, levels: Sequence[int], plan: FlightPlan) -> Sorties:
-        return Sorties(self._site, self._legs, self._battery, self._scanner, levels, by_stopping=plan.waits)
+    def _sorties(self, levels: Sequence[int], *, by_stopping: bool) -> Sorties:
+        return Sorties(self._site, self._legs, self._battery, self._scanner, levels, by_stopping=by_stopping)
 
     def _check(self, nodes: Sequence[str], levels: Sequence[int]) -> None:
         if not nodes:

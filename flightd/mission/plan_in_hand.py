@@ -53,12 +53,10 @@ class PlanInHand:
         best_order: bool,
         waits: bool,
     ) -> PlannedFlight:
-        """What a flight over the nodes (none: as configured), home or (`waits`) to hold at the last, would be
-        from a battery of `charge`: its share (0..1) and the share used in each second of flight.  InputError
-        where it cannot be flown."""
+        """What a flight over the nodes (none: as configured, of any length), home or (`waits`) counted by
+        stopping and to hold at the last, would be from a battery of `charge`: its share (0..1) and the share
+        used in each second of flight.  InputError where it cannot be flown."""
         plan, levels = self._configured, tuple(levels) if nodes else ()
-        if waits:
-            nodes = nodes or [stop.node for stop in plan.stops if stop.visit]
         if nodes:
             plan = self._chosen.plan(nodes, levels, best_order=best_order, waits=waits)
-        return self._chosen.estimate(plan, levels, *charge)
+        return self._chosen.estimate(plan, levels, *charge, by_stopping=waits)

@@ -17,6 +17,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Settled
 from flightd.core.types import CommandKind, Event, LandedState, Phase
+from flightd.mission import chosen_plan
 from flightd.mission.plan.flight_plan import HeadingPolicy
 from flightd.mission.plan.leg_times import Pace, profile_s
 from flightd.mission.plan.sweep_leg import SweepLeg
@@ -311,4 +312,18 @@ def test_a_plan_that_is_led_on_from_node_to_node_is_counted_by_stopping() -> Non
     stopping = flight.mission.planned(("A2", "A3"), (), best_order=False, waits=True)
     assert passing.sweeps
     assert not stopping.sweeps
+    assert stopping.seconds > passing.seconds
+
+
+def test_what_is_configured_is_told_by_stopping_however_many_nodes_it_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A manager asks every drone for it, and flies none that does not answer."""
+    monkeypatch.setattr(chosen_plan, "MOST_NODES", 1)
+    mission = Sweep().mission
+    passing = mission.planned((), (), best_order=False)
+    stopping = mission.planned((), (), best_order=False, waits=True)
+    assert passing.sweeps
+    assert not stopping.sweeps
+    assert (stopping.nodes, stopping.places) == (passing.nodes, passing.places)
     assert stopping.seconds > passing.seconds
