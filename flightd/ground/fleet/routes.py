@@ -73,6 +73,8 @@ def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access, facts: SiteFa
 
     async def ask_by_value(request: Request) -> Response:
         asked = await said(request, AskedByValue, "work by value")
+        if asked.nodes is not None and asked.aisles is not None:
+            raise InputError("so many nodes are asked for, or so many aisles")
         what = "nodes" if asked.aisles is None else "aisles"
         note_act(request, f"visit the most valuable: {asked.nodes or asked.aisles or 'all'} {what}")
         worth = worth_of(await facts.of(own().site))
