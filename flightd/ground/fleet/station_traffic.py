@@ -175,8 +175,11 @@ class StationTraffic:
     async def step(self, now_ms: int, aside: Aside) -> None:
         """Once round.  Whatever plans is done `aside`, by how the drones were before; who is not any more as
         he was then is left to the next step."""
-        self._call_back()
+        called = self._call_back()
         seen = {name: self._see(name, drone) for name, drone in self._drones.items()}
+        for name in called:  # what is decided, the way home as well, may take seconds
+            self._drones[name].call_off(now_ms / 1000)
+            self._drones[name].drone.may_go_home = False
         self._now_ms, is_read = now_ms, now_ms - self._read_ms < _READ_MS
         self._told, self._decides = self._document(in_full=is_read), True
         try:
@@ -188,9 +191,9 @@ class StationTraffic:
         for name, drone in self._drones.items():
             self._act(name, drone, seen[name], decided, now_ms / 1000)
 
-    def _call_back(self) -> None:
-        """Who was released into what is closed since then is called off as soon as it flies: it ends at its
-        next node, and is flown out of there."""
+    def _call_back(self) -> set[str]:
+        """Who was released into what is closed since then, and is to be called off: as soon as it flies.  It
+        ends at its next node, and is flown out of there."""
         closed, before = self._closures.closures, self._closed
         self._closed, lanes = closed, self._control.lanes
         air = lanes.lanes_between(way for one in closed if one not in before for way in one.ways)
@@ -199,6 +202,7 @@ class StationTraffic:
         called = {name for name in self._called_back if not self._drones[name].waits}
         self._called_back -= called
         self._flown -= called
+        return called
 
     async def _keep_what(self, decided: _Decided) -> None:
         """Before it is ordered."""

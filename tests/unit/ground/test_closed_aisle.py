@@ -96,6 +96,21 @@ def test_who_is_in_it_turns_at_the_next_node_and_leaves() -> None:
     fly(go, "ab")
 
 
+def test_who_is_in_it_turns_whatever_is_still_to_be_decided() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a = fleet.drones["a"]
+        fleet.own.ask(["A4"], "a")
+        await until(lambda: a.phase is Phase.FOLLOW and a.way[0] == "A3" and entered(fleet), 100)
+        await fleet.own.close("ann", aisle="A")
+        fleet.deciding = asyncio.Event()
+        await asyncio.sleep(30.0)
+        assert (a.phase, a.truth.x_m) == (Phase.HOLD, a.site.nodes["A3"].x_m)
+        fleet.deciding.set()
+        await until(lambda: a.phase is Phase.DONE, 100)
+
+    fly(go, "a")
+
+
 def test_who_was_only_released_into_it_does_not_go_in() -> None:
     async def go(fleet: PaperFleet) -> None:
         a = fleet.drones["a"]
