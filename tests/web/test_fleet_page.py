@@ -142,6 +142,10 @@ def test_an_aisle_is_closed_to_the_drones_and_opened_by_a_second_press(
         expect(page.get_by_text("1 node was asked for.")).to_be_visible()
         expect(work.get_by_role("listitem").filter(has_text="A3: aisle A is closed")).to_be_visible()
         assert hindrances(page) == []
+        page.route("**/api/fleet", lambda route: route.abort())
+        expect(closed.get_by_role("listitem")).to_contain_text("Nobody knows whether a drone is in it.")
+        page.unroute("**/api/fleet")
+        expect(closed.get_by_role("listitem")).to_contain_text("No drone is in it.")
 
         for node in ("B3", "A3"):
             page.get_by_role("button", name=f"Node {node}").click()

@@ -1,5 +1,5 @@
-// What people closed to the drones, who may still be in it, and closing and opening.  What is opened takes a second
-// press: people may be in there.
+// What people closed to the drones, who may still be in it (nobody knows while the station does not answer), and
+// closing and opening.  What is opened takes a second press: people may be in there.
 import { mayOperate } from "../access/session.js";
 import { html, useEffect, useState } from "../html.js";
 import { quoted, say } from "../language.js";
@@ -10,7 +10,7 @@ import { closeAisle, closeBetween, fleet, openAgain } from "./fleet_state.js";
 const ARMED_MS = 5000;
 
 export function ClosedCard({ told, floor }) {
-  const { chosen, closing } = fleet();
+  const { chosen, closing, trouble } = fleet();
   const closed = new Set(told.closed.map(({ name }) => name));
   const open = aislesOf(floor).filter(([aisle]) => !closed.has(aisle));
   return html`
@@ -18,7 +18,7 @@ export function ClosedCard({ told, floor }) {
       <h3 id="closed">${say("Closed to drones")}</h3>
       <p class="quiet">${say("The fleet does not fly in, and leaves it. People’s orders, schedules and drones’ own rules do not heed it.")}</p>
       ${told.closed.length > 0
-        ? html`<ul>${told.closed.map((one) => html`<${Closed} key=${one.name} one=${one} />`)}</ul>`
+        ? html`<ul>${told.closed.map((one) => html`<${Closed} key=${one.name} one=${trouble ? { ...one, inside: null } : one} />`)}</ul>`
         : html`<p class="quiet">${say("Nothing is closed.")}</p>`}
       ${mayOperate() &&
       html`<div class="choose-row" role="group" aria-label=${say("Close aisles")}>
