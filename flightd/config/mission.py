@@ -109,7 +109,9 @@ class MissionConfig(Section):
         VisitOrder.GIVEN, description="given: nodes as listed (all: aisle by aisle); best: the quickest order"
     )
     heading: Heading = Field(
-        Heading.ALONG, description="along: nose in flight direction; shelf: nose to the shelf"
+        Heading.ALONG,
+        description="along: nose in flight direction; shelf: nose to the shelf, as always where scan.mode is"
+        ' "sweep" and the front camera looks ahead',
     )
     pad: str | None = Field(None, description="id of the pad that it stands on at first; none: the home pad")
     start_yaw_deg: float = Field(

@@ -30,8 +30,8 @@ class HeadingPolicy:
 
     @classmethod
     def of(cls, config: Config, site: Site) -> HeadingPolicy:
-        """The mission's heading, flown with the configured down camera; nose to the shelf where shelves are
-        flown past, or stopped before by who might, with a camera that looks ahead."""
+        """The mission's heading, flown with the configured down camera; nose to the shelf for who may
+        fly past shelves with a camera that looks ahead, where he stops before them, too."""
         ahead = abs(config.front_camera.mount_yaw_deg) < _AHEAD_DEG
         counts = config.front_camera.is_fitted and bool(site.locations)
         swept = config.scan.mode is ScanMode.SWEEP and counts and ahead
