@@ -320,7 +320,10 @@ class OwnFleet(VehicleSides):
 
     async def open(self, name: str) -> None:
         """Have them fly there again.  InputError where nothing is closed by that name."""
-        await self._closures.open(name)
+        try:
+            await self._closures.open(name)
+        finally:
+            self._compared = {}  # it may have kept them from flying by their maps
 
     def document(self) -> dict[str, Any]:
         """How it is, as JSON has it."""

@@ -24,6 +24,7 @@ from flightd.ground.fleet.closed_ways import aisle_closure, check_on_map, closur
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor, with_all_pads
 from flightd.ground.fleet.fleet_memory import FILE, FleetMemory, KeptClosure
 from flightd.ground.messages import Act
+from tests.rigs import paper_drones
 from tests.rigs.paper_drones import PADS, hall
 from tests.rigs.paper_fleet import PaperFleet, fly, on_way_to, until
 from tests.unit.ground.test_fleet_restart import at_rest, until_done
@@ -274,6 +275,26 @@ def test_nobody_is_flown_by_a_map_that_lacks_what_is_closed(tmp_path: Path) -> N
         await until(lambda: fleet.state["flies"], 10)
 
     fly(go, memory=memory)
+
+
+def test_a_map_that_lacks_what_is_closed_is_flown_by_once_that_is_open(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        await fleet.own.close("ann", nodes=["A4", "A5"])
+        monkeypatch.setattr(paper_drones, "_STEPS_M", (2.0, 1.6, 1.6))
+        monkeypatch.setattr(paper_drones, "PADS", {"a": "A1", "b": "B1"})
+        for name, drone in fleet.drones.items():
+            drone.site = hall(name)
+            drone.begin_anew()
+        await until(lambda: "but on another map" in fleet.state["trouble"], 30)
+        await asyncio.sleep(10.0)
+        assert not any(map(fleet.flown, "ab"))
+        await fleet.own.open("A4, A5")
+        await until(lambda: all(map(fleet.flown, "ab")), 30)
+        assert fleet.state["trouble"] == ""
+
+    fly(go, "ab")
 
 
 def test_what_lies_behind_what_is_closed_is_told_and_flown_once_that_is_open() -> None:
