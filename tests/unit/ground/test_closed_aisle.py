@@ -260,6 +260,22 @@ def test_nobody_is_flown_before_it_is_known_what_is_closed(
     fly(go, memory=FleetMemory(tmp_path))
 
 
+def test_a_file_that_tells_of_nothing_closed_any_more_flies_nobody_until_a_person_puts_it_away(
+    tmp_path: Path,
+) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        await fleet.kill()
+        (tmp_path / FILE).write_text("something else, of no use to a station at all")
+        fleet.start_again()
+        await asyncio.sleep(30.0)
+        assert not fleet.state["flies"]
+        assert "not the fleet of a ground station" in fleet.state["trouble"]
+        (tmp_path / FILE).unlink()
+        await until(lambda: fleet.state["flies"], 10)
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
 def test_nobody_is_flown_by_a_map_that_lacks_what_is_closed(tmp_path: Path) -> None:
     memory = FleetMemory(tmp_path)
 
