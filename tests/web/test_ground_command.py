@@ -60,6 +60,7 @@ def _own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (["--folder", "/etc/passwd"], "--folder /etc/passwd: is a file, no folder"),
         (["--listen", "0.0.0.0", "--foxglove", "127.0.0.1:0"], "--foxglove: everybody shall sign in, and"),
         (["--fleet", "--mqtt", "mqtt://h", "--mqtt-orders"], "--fleet: the fleet's manager flies the drones"),
+        (["--fleet-charged", "80"], "--fleet-charged 80: there is no fleet whose drones could wait"),
         (["--fleet", "--mqtt-body", "round"], "--mqtt-body: 'round' is no size of a drone"),
         (["--foxglove", "0.0.0.0"], "--foxglove 0.0.0.0: reaches beyond this machine, and Foxglove"),
     ],

@@ -206,6 +206,12 @@ def ground(
         raise InputError("expected 5 to 3600 s", key=f"--mqtt-hold {mqtt_hold:g}")
     if not 0.0 <= fleet_charged <= 100.0:
         raise InputError("expected 0 to 100 %", key=f"--fleet-charged {fleet_charged:g}")
+    if fleet_charged and not fleet:
+        raise InputError(
+            "there is no fleet whose drones could wait for their charge",
+            key=f"--fleet-charged {fleet_charged:g}",
+            remedy="give --fleet, or leave it out",
+        )
     if folder is not None and not folder.is_dir():
         what = "is a file, no folder" if folder.exists() else "there is no such folder"
         raise InputError(what, key=f"--folder {folder}")
