@@ -33,7 +33,6 @@ from flightd.app.absent_parts import (
     keep_pose,
 )
 from flightd.app.counting.count import Counting
-from flightd.app.counting.flight_count import counts_shelves
 from flightd.app.detection.detector_pool import DetectorPool, Detectors
 from flightd.app.detection.latency import LatencyBook
 from flightd.app.detection.pipeline import DetectionPipeline
@@ -58,7 +57,7 @@ from flightd.core.topics import Topic
 from flightd.core.types import AttitudeSetpoint, EventLevel
 from flightd.mission.battery.sorties import check_battery
 from flightd.mission.guidance import CEILING_MARGIN_M
-from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, counts_shelves, make_plan
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.route_optimiser import ordered_best
 from flightd.mission.scan.code_assignment import FrontSight

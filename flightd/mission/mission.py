@@ -172,8 +172,7 @@ class Mission:
         """What a flight over the nodes would be, from the pad that it stands on first and with the battery as
         it is told now (none: what the configuration says); changes nothing.  InputError where it
         cannot be flown."""
-        charge = self._charging.charge
-        return self._plan.planned(nodes, levels, charge, best_order=best_order, waits=waits)
+        return self._plan.planned(nodes, levels, self._charging.charge, best_order=best_order, waits=waits)
 
     def outlook(self, now_ns: int) -> Outlook:
         """What it expects and what troubles it."""

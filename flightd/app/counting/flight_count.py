@@ -16,14 +16,10 @@ from flightd.app.counting.text_searcher import TextSearcher, needs_extra
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import PlannedLocation
+from flightd.mission.plan.flight_plan import counts_shelves
 from flightd.ports import Clock
 from flightd.runtime.clock import Hold
 from flightd.site.site import Site
-
-
-def counts_shelves(config: Config, site: Site) -> bool:
-    """Whether flights count: with a front camera, where there are locations."""
-    return config.front_camera.is_fitted and bool(site.locations)
 
 
 class FlightCount:

@@ -21,6 +21,11 @@ _AHEAD_DEG = 45.0
 """A front camera that is turned aside by less looks along the nose."""
 
 
+def counts_shelves(config: Config, site: Site) -> bool:
+    """Whether flights count: with a front camera, where there are locations."""
+    return config.front_camera.is_fitted and bool(site.locations)
+
+
 @dataclass(frozen=True, slots=True)
 class HeadingPolicy:
     """The heading wanted, and whether the longer side of the picture lies along the drone's nose."""
@@ -33,8 +38,7 @@ class HeadingPolicy:
         """The mission's heading, flown with the configured down camera; nose to the shelf for who may
         fly past shelves with a camera that looks ahead, where he stops before them, too."""
         ahead = abs(config.front_camera.mount_yaw_deg) < _AHEAD_DEG
-        counts = config.front_camera.is_fitted and bool(site.locations)
-        swept = config.scan.mode is ScanMode.SWEEP and counts and ahead
+        swept = config.scan.mode is ScanMode.SWEEP and counts_shelves(config, site) and ahead
         return cls(Heading.SHELF if swept else config.mission.heading, config.camera.long_side_ahead)
 
 
