@@ -50,6 +50,11 @@ class ClosedAir:
         """All that is closed, each by itself."""
         return tuple(self._zones.values())
 
+    @property
+    def air(self) -> frozenset[int]:
+        """All that is closed, together."""
+        return frozenset().union(*self.zones)
+
     def shut_for(self, air: Collection[int]) -> frozenset[int]:
         """What is closed for who may be in this air: every zone but those in which he is."""
         return frozenset().union(*(zone for zone in self.zones if zone.isdisjoint(air)))
@@ -64,7 +69,7 @@ class ClosedAir:
         while queue:
             metres, here, way = heapq.heappop(queue)
             if here in goals:
-                return frozenset().union(*self.zones).difference(way)
+                return self.air.difference(way)
             if here in seen:
                 continue
             seen.add(here)
@@ -84,7 +89,7 @@ class ClosedAir:
         """The vertices from which a way leads to this one over lanes that are open."""
         found = self._ways_home.get(home)
         if found is None:
-            found = self._ways_home[home] = self._leading_to(home, frozenset().union(*self.zones))
+            found = self._ways_home[home] = self._leading_to(home, self.air)
         return found
 
     def comes_home(self, air: Collection[int], start: int, home: int) -> bool:

@@ -236,7 +236,7 @@ class TrafficControl:
                 continue
             if not planned.without:
                 break
-            closed = frozenset().union(*self.closed.zones)
+            closed = self.closed.air
             if barred := {d for d in planned.without if not closed.isdisjoint(self.drones[d].air)} - at_large:
                 at_large |= barred
                 continue
@@ -317,7 +317,7 @@ class TrafficControl:
         """What is closed, and what for those who stand in it: what people closed they leave by the shortest
         way, those `at_large` by any."""
         zones = tuple(self._avoided.values())
-        avoided, closed = frozenset().union(*zones), frozenset().union(*self.closed.zones)
+        avoided, closed = frozenset().union(*zones), self.closed.air
         inside: dict[str, frozenset[int]] = {}
         for drone in drones:
             course = self.drones[drone]
