@@ -47,6 +47,7 @@ from flightd.sim.racks.label_texts import (
 )
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.racks.stock import StockShares
+from flightd.sim.sensors.optics import Taking
 from flightd.site.site import Location, Side, Site
 from flightd.site.site_file import load_site
 from flightd.vision.shelf.code_reader import read_codes
@@ -220,7 +221,7 @@ def _fly_past(site: Site, leg: SweepLeg, scanner: Scanner, flight: Flight, seed:
         true, pose = _poses(rng, now_ns, (x_m, y_m, leg.height_m), leg)
         places = scanner.places(pose)
         if places:
-            picture = renderer.render(true, seq, None, *how)
+            picture = renderer.render(true, seq, None, Taking(*how))
             scanner.take(read_shelf(picture, seq, now_ns, places, *how)[0], pose)
         speed_mps = min(leg.speed_mps, scanner.passing_mps)
         scanner.step_sweep(now_ns, leg, speed_mps)

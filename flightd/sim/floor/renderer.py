@@ -25,9 +25,11 @@ from flightd.sim.floor.tiles import Ahead, TiledFloor
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.camera_effects import Sensor, blur_kernel
 from flightd.sim.sensors.optics import (
+    USUALLY,
     Floats,
     RayTable,
     SimCamera,
+    Taking,
     floor_viewpoint,
     moved,
     picture_for,
@@ -67,16 +69,10 @@ class Renderer:
         self._sensor = Sensor(camera.lens, appearance, seed)
 
     def render(
-        self,
-        kinematics: Kinematics,
-        seq: int,
-        out: Image | None = None,
-        exposure: float = 1.0,
-        gain: float = 1.0,
-        lamp: float = 0.0,  # noqa: ARG002 - it does not light the floor
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, how: Taking = USUALLY
     ) -> Image:
-        """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise,
-        `exposure` and `gain` are its parts of the camera's usual ones.
+        """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise.  No lamp
+        lights the floor.
 
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
         picture = picture_for(self._camera.lens, out)
@@ -88,10 +84,10 @@ class Renderer:
         # whole texels and 32nds: a quarter faster than the look-up by floats, equal to one grey level
         texels, parts = cv2.convertMaps(floor_map, None, cv2.CV_16SC2)  # type: ignore[call-overload]
         cv2.remap(canvas, texels, parts, cv2.INTER_LINEAR, dst=picture, borderMode=cv2.BORDER_REPLICATE)
-        self._smear(picture, kinematics, exposure)
+        self._smear(picture, kinematics, how.exposure)
         self._shine(picture, view, x_m, y_m)
         self._shade(picture, kinematics, view, x_m, y_m)
-        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure, gain)
+        self._sensor.expose(picture, kinematics.stamp_ns, seq, how.exposure, how.gain)
         self._tiles.prepare(x_m, y_m, foot, footprint_m, _ahead(kinematics, view))
         return picture
 

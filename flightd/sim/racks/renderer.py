@@ -25,7 +25,7 @@ from flightd.sim.racks.rack_layout import faces
 from flightd.sim.racks.scene import Racks, Sightline
 from flightd.sim.racks.stock import stock
 from flightd.sim.sensors.camera_effects import Sensor, blur_kernel
-from flightd.sim.sensors.optics import picture_for
+from flightd.sim.sensors.optics import USUALLY, Taking, picture_for
 from flightd.site.site import Site
 
 _COARSE = 2
@@ -72,17 +72,9 @@ class FrontRenderer:
         )
 
     def render(
-        self,
-        kinematics: Kinematics,
-        seq: int,
-        out: Image | None = None,
-        exposure: float = 1.0,
-        gain: float = 1.0,
-        lamp: float = 0.0,
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, how: Taking = USUALLY
     ) -> Image:
-        """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise,
-        `exposure` and `gain` are its parts of the camera's usual ones, `lamp` the light
-        of the lamp beside it, 1 m away.
+        """(H, W, 3) BGR picture of the exposure whose middle is `kinematics`; `seq` draws the noise.
 
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
         picture = picture_for(self._camera.lens, out)
@@ -96,9 +88,9 @@ class FrontRenderer:
         if self._bend is not None:
             drawn = np.asarray(cv2.remap(drawn, *self._bend, cv2.INTER_LINEAR), np.uint8)
         cv2.cvtColor(drawn, cv2.COLOR_BGRA2BGR, dst=picture)
-        self._blur(picture, kinematics, _distance_m(view, seen), exposure)
-        light = self._light.draw(view, seen, lamp)
-        self._sensor.expose(picture, kinematics.stamp_ns, seq, exposure, gain, light, USUAL_LIGHT)
+        self._blur(picture, kinematics, _distance_m(view, seen), how.exposure)
+        light = self._light.draw(view, seen, how.lamp)
+        self._sensor.expose(picture, kinematics.stamp_ns, seq, how.exposure, how.gain, light, USUAL_LIGHT)
         return picture
 
     def _background(self, view: Viewpoint) -> Image:

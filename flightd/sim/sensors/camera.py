@@ -12,10 +12,10 @@ import math
 import random
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import cv2
 
@@ -28,6 +28,7 @@ from flightd.runtime.clock import Hold
 from flightd.runtime.frame_notice import FrameNotice, decode_request, encode_notice
 from flightd.runtime.frame_ring import FrameRing
 from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.sensors.optics import USUALLY, Taking
 
 _SPARE_SLOTS = 8
 _EXPOSURES, _GAINS = (0.05, 8.0), (0.25, 8.0)
@@ -52,22 +53,11 @@ class Optics(Protocol):
 
 
 class PictureMaker(Protocol):
-    """Renders one camera's pictures, each with a part of the camera's usual exposure, and of its gain; `lamp`
-    is the light of the lamp beside it, 1 m away, as a part of the usual one."""
+    """Renders one camera's pictures."""
 
     def render(
-        self,
-        kinematics: Kinematics,
-        seq: int,
-        out: Image | None = None,
-        exposure: float = 1.0,
-        gain: float = 1.0,
-        lamp: float = 0.0,
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, how: Taking = USUALLY
     ) -> Image: ...
-
-
-_How: TypeAlias = tuple[float, float, float]
-"""Parts of the usual exposure and gain, and the lamp's light."""
 
 
 class _RenderWorker:
@@ -79,15 +69,15 @@ class _RenderWorker:
         self._make = make
         self._problem = _problem_of(self._begin)
 
-    def __call__(self, request: tuple[Kinematics, int, int, _How]) -> str:
+    def __call__(self, request: tuple[Kinematics, int, int, Taking]) -> str:
         self._problem = self._problem or _problem_of(partial(self._render, *request))
         return self._problem
 
     def _begin(self) -> None:
         self._renderer = self._make()
 
-    def _render(self, kinematics: Kinematics, seq: int, slot: int, how: _How) -> None:
-        self._renderer.render(kinematics, seq, self._ring.pixels(slot), *how)
+    def _render(self, kinematics: Kinematics, seq: int, slot: int, how: Taking) -> None:
+        self._renderer.render(kinematics, seq, self._ring.pixels(slot), how)
 
 
 def _problem_of(act: Callable[[], None]) -> str:
@@ -168,7 +158,7 @@ class CameraPeer:
         self._turn = asyncio.Lock()
         self.late = 0
         """Pictures that the machine was too slow to take."""
-        self._how = 1.0, 1.0
+        self._how = USUALLY
         self.trouble = CameraTrouble()
         self._kept: Image | None = None
         self._newest = 0
@@ -194,7 +184,7 @@ class CameraPeer:
             self._ring.close()
 
     def _expose_with(self, part: float, gain: float) -> None:
-        self._how = part, gain
+        self._how = Taking(part, gain)
 
     async def _expose(self, child: Child, transport: Any, pictures: asyncio.TaskGroup) -> None:
         """Take a picture each period; each is rendered and delivered by a task of its own."""
@@ -217,12 +207,12 @@ class CameraPeer:
                 straggles = seq % self.trouble.straggler_every == 0
                 late_s = self.trouble.late_s + (self.trouble.straggler_s if straggles else 0.0)
                 due_ns += round(late_s * 1e9)
-                how = *self._how, self._lamp()
+                how = replace(self._how, lamp=self._lamp())
                 pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, how))
             seq += 1
 
     async def _deliver(
-        self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int, how: _How
+        self, child: Child, transport: Any, truth: Kinematics, seq: int, due_ns: int, how: Taking
     ) -> None:
         early_s = self._camera.capture_delay_s + self._camera.jitter_s
         # a late picture is drawn late: the ring holds no more than the usual delay's
@@ -249,11 +239,12 @@ class CameraPeer:
             truth.stamp_ns + _CLOCK_OFFSET_NS,
             lens.width_px,
             lens.height_px,
-            *how[:2],
+            how.exposure,
+            how.gain,
         )
         transport.sendto(encode_notice(notice))
 
-    async def _render(self, child: Child, truth: Kinematics, seq: int, how: _How, latest_ns: int) -> int:
+    async def _render(self, child: Child, truth: Kinematics, seq: int, how: Taking, latest_ns: int) -> int:
         """The slot of the picture.  TransientError when its turn did not come until `latest_ns`, RunError
         when it cannot be drawn at all."""
         async with self._turn:

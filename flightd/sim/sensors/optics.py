@@ -139,6 +139,19 @@ def moved(k: Kinematics, dt_s: float) -> Kinematics:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Taking:
+    """How a picture is taken: with which parts of the camera's usual exposure and gain, and the light of the
+    lamp beside it, 1 m away, as a part of the usual one."""
+
+    exposure: float = 1.0
+    gain: float = 1.0
+    lamp: float = 0.0
+
+
+USUALLY = Taking()
+
+
 def picture_for(lens: Lens, out: Image | None = None) -> Image:
     """Where a camera with this lens draws its picture: `out`, or a new one.  ValueError where `out` does
     not fit."""

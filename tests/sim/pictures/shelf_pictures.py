@@ -15,6 +15,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
+from flightd.sim.sensors.optics import Taking
 from flightd.site.site import Site
 
 
@@ -52,7 +53,7 @@ def shelf_pictures(
                 for part in parts:
                     stamp_ns += 1
                     hover, pose = _poses(rng, view, stamp_ns)
-                    yield ShelfPicture(renderer.render(hover, stamp_ns, exposure=part), view, pose, part)
+                    yield ShelfPicture(renderer.render(hover, stamp_ns, how=Taking(part)), view, pose, part)
                 view = planner.retake(view, view.locations) if retakes else None
 
 

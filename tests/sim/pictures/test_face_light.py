@@ -19,6 +19,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
+from flightd.sim.sensors.optics import Taking
 from flightd.site.site_file import load_site
 from flightd.vision.shelf.shelf_look import read_shelf
 
@@ -64,7 +65,7 @@ def flown_past(lit: float, *, learns: bool, lamp: float = 0.0) -> tuple[dict[str
             moves = speed_mps, 0.0, 0.0, 0.0, 0.0, leg.yaw_rad, 0.0, 0.0, 0.0
             true = Kinematics(now_ns, x_m, y_m, leg.height_m, *moves)
             taken = how[0]  # asked for two pictures ago
-            picture = renderer.render(true, seq, None, *taken, lamp)
+            picture = renderer.render(true, seq, None, Taking(*taken, lamp))
             scanner.take(read_shelf(picture, seq, now_ns, places, *taken)[0], pose)
         scanner.step_sweep(now_ns, leg, speed_mps)
         how = [*how[1:], scanner.exposure]

@@ -29,6 +29,7 @@ from flightd.sim.racks.front_camera import FrontCamera, front_lens
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.scenario import FrontCameraScenario, Scenario
 from flightd.sim.sensors.camera import CameraPeer, PictureMaker
+from flightd.sim.sensors.optics import USUALLY, Taking
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import real, virtual
 from tests.rigs.held_time import held
@@ -106,13 +107,7 @@ class Broken:
     """Draws two pictures."""
 
     def render(
-        self,
-        kinematics: Kinematics,
-        seq: int,
-        out: Image | None = None,
-        exposure: float = 1.0,
-        gain: float = 1.0,
-        lamp: float = 0.0,
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, how: Taking = USUALLY
     ) -> Image:
         if seq == 2:
             raise ValueError("a picture\nof nothing")
@@ -127,13 +122,7 @@ class Dying:
         os._exit(3)
 
     def render(
-        self,
-        kinematics: Kinematics,
-        seq: int,
-        out: Image | None = None,
-        exposure: float = 1.0,
-        gain: float = 1.0,
-        lamp: float = 0.0,
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, how: Taking = USUALLY
     ) -> Image:
         raise AssertionError
 
@@ -163,13 +152,7 @@ class Slow:
     """Takes half as long again over a picture as the camera has for one."""
 
     def render(
-        self,
-        kinematics: Kinematics,
-        seq: int,
-        out: Image | None = None,
-        exposure: float = 1.0,
-        gain: float = 1.0,
-        lamp: float = 0.0,
+        self, kinematics: Kinematics, seq: int, out: Image | None = None, how: Taking = USUALLY
     ) -> Image:
         until_s = time.monotonic() + 1.5 / CAMERA.fps
         while time.monotonic() < until_s:

@@ -19,6 +19,7 @@ from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.rack_layout import faces
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.racks.stock import Condition, Label, StockPlace, StockShares, StockSituation, stock
+from flightd.sim.sensors.optics import Taking
 from flightd.site.site import Side
 from flightd.site.site_file import load_site
 from flightd.vision.shelf.code_reader import read_codes
@@ -241,7 +242,7 @@ def test_what_is_over_lit_is_not_lost_for_a_shorter_exposure() -> None:
     pose = facing(left_front(), 0)
     usual, bright = in_light().render(pose, 0).astype(float), in_light(A_left=3.0)
     assert (bright.render(pose, 0) == 255).mean() > 0.05
-    shorter = bright.render(pose, 0, None, 1.0 / 3.0).astype(float)
+    shorter = bright.render(pose, 0, None, Taking(1.0 / 3.0)).astype(float)
     assert np.abs(shorter - usual)[200:-200, 300:-300].mean() < 2.0
 
 
@@ -249,7 +250,7 @@ def test_gain_brings_light_and_noise() -> None:
     noisy = FrontRenderer(SITE, CAMERA, replace(STILL, noise=2.0), SEED)
     pose = facing(left_front(), 0)
     still = in_light().render(pose, 0).astype(float)
-    usual, gained = noisy.render(pose, 0), noisy.render(pose, 0, None, 0.25, 4.0)
+    usual, gained = noisy.render(pose, 0), noisy.render(pose, 0, None, Taking(0.25, 4.0))
     assert gained.mean() == pytest.approx(usual.mean(), rel=0.03)
     assert np.abs(gained - still).mean() > 1.5 * np.abs(usual - still).mean()
 
@@ -258,5 +259,8 @@ def test_a_lamp_lights_what_is_near() -> None:
     node = SITE.nodes[left_front().opening.location.node]
     near, far = (facing(left_front(), 0, y_m=node.y_m + off_m) for off_m in (-0.3, 0.3))
     dark = in_light(A_left=0.1)
-    brighter = [dark.render(pose, 0, lamp=0.9).mean() - dark.render(pose, 0).mean() for pose in (near, far)]
+    brighter = [
+        dark.render(pose, 0, how=Taking(lamp=0.9)).mean() - dark.render(pose, 0).mean()
+        for pose in (near, far)
+    ]
     assert max(brighter) > 1.3 * min(brighter) > 10.0
