@@ -184,7 +184,7 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
         Trigger.DWELLED: Phase.TURN,
         Trigger.ROUTE_DONE: Phase.LAND,
     },
-    Phase.CLIMB: _ON_LINES | {Trigger.AT_VIEW: Phase.SCAN},
+    Phase.CLIMB: _ON_LINES | {Trigger.AT_VIEW: Phase.SCAN, Trigger.VIEW_MISSED: Phase.CLIMB},
     Phase.SCAN: _ON_LINES
     | {Trigger.VIEW_DONE: Phase.CLIMB, Trigger.DWELLED: Phase.TURN, Trigger.ROUTE_DONE: Phase.LAND},
     Phase.TURN: _ON_LINES | {Trigger.TURNED: Phase.FOLLOW},
@@ -213,7 +213,9 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
 }
 """Which phase a trigger begins, whatever the intent; `_begins` has what depends on that."""
 
-_FOR_VISITS = frozenset({Trigger.READY, Trigger.SCAN_DUE, Trigger.VIEW_DONE, Trigger.AWAITS_MORE})
+_FOR_VISITS = frozenset(
+    {Trigger.READY, Trigger.SCAN_DUE, Trigger.VIEW_DONE, Trigger.VIEW_MISSED, Trigger.AWAITS_MORE}
+)
 """What leads on only where the plan is flown: nothing starts unordered, is scanned or waits on the way
 back."""
 

@@ -63,6 +63,7 @@ class Trigger(enum.Enum):
     ARRIVED = "arrived"
     SCAN_DUE = "locations to scan"
     AT_VIEW = "view reached"
+    VIEW_MISSED = "view not reached in time"
     VIEW_DONE = "view scanned"
     AWAITS_MORE = "waiting to be told where to fly on"
     DWELLED = "dwell over"

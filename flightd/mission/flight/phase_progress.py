@@ -24,6 +24,11 @@ _READING_S = 0.8
 """At the end of the last leg past a shelf its pictures are still being read."""
 
 
+_WIDENS, _WIDEST = (0.2, 0.7), 3.0
+"""Between these parts of a phase's slack the bounds within which a goal is reached grow to so many
+times their width: gusts swing a drone about its place for as long as they last."""
+_MISSED = 0.8
+"""After this part of it a view is given up."""
 _LINGERS_M = 0.25
 """So far on a leg's first place is still seen well enough to count."""
 
@@ -86,15 +91,12 @@ class PhaseProgress:
                 calm = s.localised and s.is_sure(p) and self._motion.speed_mps < 2 * p.expert.arrive_mps
                 done, trigger = self._settled(s, calm), Trigger.ACQUIRED
             case Phase.TURN:
-                turned = (
-                    s.pose is not None
-                    and abs(wrap_pi(goal.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
-                )
+                turned = self._faces(s, goal.yaw_rad)
                 level = goal.sweep is None or state.returning or self._is_level(s, goal.sweep.height_m)
                 stands_s = max(p.settle_s, self._stands_s) if goal.sweep is not None else p.settle_s
                 done, trigger = self._settled(s, turned and level, stands_s), Trigger.TURNED
             case Phase.FOLLOW:
-                there = self._rests_at((goal.x_m, goal.y_m))
+                there = self._rests_at(s, (goal.x_m, goal.y_m))
                 # before the next leg past a shelf it comes to stand anyway
                 leads_on = goal.sweep is not None and not goal.sweep.last and not state.returning
                 settle_s = 0.0 if leads_on else p.settle_s
@@ -110,7 +112,9 @@ class PhaseProgress:
         goal, scan = self._itinerary.goal, self._scan
         due = not returning and scan.due(phase, goal)
         if phase is Phase.CLIMB:
-            return self._settled(s, self._at_view(s)) or not due, Trigger.AT_VIEW
+            if self._settled(s, self._at_view(s)) or not due:
+                return True, Trigger.AT_VIEW
+            return self._overdue(s.now_ns) > _MISSED, Trigger.VIEW_MISSED
         over = Trigger.ROUTE_DONE if self._itinerary.is_last else Trigger.DWELLED
         if phase is Phase.SCAN:
             done = not due or (s.is_sure(self._params) and self._scanner.step(s.now_ns))
@@ -127,24 +131,36 @@ class PhaseProgress:
 
     def _at_view(self, s: MissionInputs) -> bool:
         """Whether the drone is at the view, level with it and facing the shelf."""
-        p, view = self._params, self._scanner.view
-        if view is None or s.pose is None:
+        view = self._scanner.view
+        if view is None:
             return False
-        there = self._rests_at((view.x_m, view.y_m))
-        return (
-            there
-            and self._is_level(s, view.height_m)
-            and abs(wrap_pi(view.yaw_rad - s.pose.yaw_rad)) < p.expert.arrive_yaw_rad
-        )
+        there = self._rests_at(s, (view.x_m, view.y_m))
+        return there and self._is_level(s, view.height_m) and self._faces(s, view.yaw_rad)
+
+    def _faces(self, s: MissionInputs, yaw_rad: float) -> bool:
+        """Whether the drone has turned to a heading."""
+        bound_rad = self._width(s.now_ns) * self._params.expert.arrive_yaw_rad
+        return s.pose is not None and abs(wrap_pi(yaw_rad - s.pose.yaw_rad)) < bound_rad
 
     def _is_level(self, s: MissionInputs, height_m: float) -> bool:
         """Whether the drone is at the height from which a shelf is looked at."""
-        return abs(s.height_m - height_m) < self._params.expert.view_height_m
+        return abs(s.height_m - height_m) < self._width(s.now_ns) * self._params.expert.view_height_m
 
-    def _rests_at(self, place_m: tuple[float, float]) -> bool:
+    def _rests_at(self, s: MissionInputs, place_m: tuple[float, float]) -> bool:
         """Whether the drone is at a place of the map, but for what it swings about it."""
-        near = self._motion.distance_m(place_m) < self._params.arrive_m
-        return near and self._motion.speed_mps < self._params.expert.arrive_mps
+        width = self._width(s.now_ns)
+        near = self._motion.distance_m(place_m) < width * self._params.arrive_m
+        return near and self._motion.speed_mps < width * self._params.expert.arrive_mps
+
+    def _width(self, now_ns: int) -> float:
+        """How many times its usual width each bound of a goal has by now: 1 unless the phase is overdue."""
+        begin, end = _WIDENS
+        late = (self._overdue(now_ns) - begin) / (end - begin)
+        return 1.0 + (_WIDEST - 1.0) * min(max(late, 0.0), 1.0)
+
+    def _overdue(self, now_ns: int) -> float:
+        """The part of its slack that the phase in hand has used up; below 0 within its own time."""
+        return 1.0 - (self._limit_s - self.phase_s(now_ns)) / self._params.expert.phase_slack_s
 
     def _turn_s(self, s: MissionInputs, to: View | SweepLeg | None) -> float:
         """How long it may take to turn, and to reach the height of a view or of a leg past a shelf."""

@@ -57,6 +57,9 @@ class NoScan:
     def begin(self, now_ns: int) -> None:
         """Nothing begins."""
 
+    def miss(self, now_ns: int) -> None:
+        """No view is flown to."""
+
     def step(self, _now_ns: int) -> bool:
         return True
 

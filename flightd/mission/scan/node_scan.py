@@ -13,6 +13,8 @@ from flightd.mission.scan.location_votes import LocationVotes
 from flightd.mission.scan.views import View, ViewPlanner
 
 _SAME_EXPOSURE = 0.01
+_GIVES_UP = 2
+"""So many views of a node that are not reached: what keeps the drone from those keeps it from the others."""
 
 
 class ScanTask:
@@ -41,6 +43,7 @@ class ScanTask:
         self._begun_ns: int | None = None
         self._relit = False
         self._followed = self._unfollowed = 0
+        self._missed = 0
         self._findings: list[Finding] = []
 
     @property
@@ -103,13 +106,29 @@ class ScanTask:
         if again is not None:
             self._views[0] = again
             return True
+        self._end(left)
+        return True
+
+    def miss(self) -> tuple[str, ...]:
+        """The view cannot be reached, and after the second one none is flown to any more.  The locations that
+        were to be looked at; they are decided as far as they were seen."""
+        self._missed += 1
+        given_up = len(self._views) if self._missed >= _GIVES_UP else min(len(self._views), 1)
+        missed: tuple[str, ...] = ()
+        for view in self._views[:given_up]:
+            left = self._left(view)
+            missed += left
+            self._end(left)
+        return missed
+
+    def _end(self, left: Sequence[str]) -> None:
+        """Go on to the next view; nothing else is to be learnt of these locations."""
         self._relit = False
         for code in left:
             self._settle(code, final=True)
             self._open.pop(code, None)
         self._views.pop(0)
         self._usual.pop(0)
-        return True
 
     def _again(self, view: View, left: Sequence[str]) -> View | None:
         """Another look at what is left of a view: once with another exposure, then from other places."""

@@ -170,6 +170,15 @@ class Scanner:
         if self._task is not None:
             self._task.begin(now_ns)
 
+    def miss(self, now_ns: int) -> None:
+        """The view cannot be reached; `view` is then the next one that still may be."""
+        if self._task is not None:
+            missed = self._task.miss()
+            self._gather()
+            if missed:
+                text = f"no look at {len(missed)} places from {self._task.node}: not reached in time"
+                self._events.append(Event(now_ns, EventLevel.WARNING, "view_missed", text))
+
     def step(self, now_ns: int) -> bool:
         """True when the view is over; `view` is then the next one."""
         over = self._task is None or self._task.step(now_ns)

@@ -123,6 +123,8 @@ class ShelfScan:
             scanner.arrive(stop.node, s.height_m, s.pose.yaw_rad)
         elif trigger is Trigger.AT_VIEW:
             scanner.begin(s.now_ns)
+        elif trigger is Trigger.VIEW_MISSED:
+            scanner.miss(s.now_ns)
         elif before in _TO_VIEW and phase not in _TO_VIEW:
             scanner.leave()
             self._scanned = stop.node if trigger in _OVER else ""

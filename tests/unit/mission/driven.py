@@ -31,6 +31,11 @@ POLICY = HeadingPolicy(Heading.ALONG)
 TICK_NS = 20_000_000
 
 
+def at_rest(_seconds: float) -> tuple[float, float]:
+    """Right where it is led."""
+    return 0.0, 0.0
+
+
 class Flight:
     """Feeds a mission with inputs: by default all is well and the drone is wherever the mission wants."""
 
@@ -47,6 +52,8 @@ class Flight:
         self.site = site
         self.integrity = 1.0
         self.heartbeat_s = 0.0
+        self.off_m: Callable[[float], tuple[float, float]] = at_rest
+        """How far from where it is led it is along the aisles, and above, at a time in s."""
         self.now_ns = 10**12
         self.guidance: Guidance | None = None
         state = VehicleState(
@@ -86,7 +93,9 @@ class Flight:
             self.now_ns += TICK_NS
             g = self.guidance
             if follow and g is not None and g.guide is not Guide.NONE:
-                height = 0.1 + (0.0 if math.isnan(g.reference.height_m) else g.reference.height_m)
+                along_m, above_m = self.off_m(self.now_ns * 1e-9)
+                along_mps = (along_m - self.off_m((self.now_ns - TICK_NS) * 1e-9)[0]) / 0.02
+                height = 0.1 + (0.0 if math.isnan(g.reference.height_m) else g.reference.height_m) + above_m
                 if not math.isnan(self.inputs.height_m):
                     self.inputs = replace(self.inputs, height_m=height)
                 r = g.reference
@@ -97,9 +106,9 @@ class Flight:
                     0,
                     0,
                     r.yaw_rad,
-                    r.x_m,
+                    r.x_m + along_m,
                     r.y_m,
-                    r.vx_mps,
+                    r.vx_mps + along_mps,
                     r.vy_mps,
                     height,
                     (0.0,) * 9,

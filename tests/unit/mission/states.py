@@ -341,6 +341,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.ARRIVED: placed(),
     Trigger.SCAN_DUE: Stimulus(_idle, scanning=(Phase.HOVER,)),
     Trigger.AT_VIEW: Stimulus(_idle, 10.0, follow=True),
+    Trigger.VIEW_MISSED: Stimulus(_idle, 30.0),
     Trigger.VIEW_DONE: Stimulus(_idle, 0.6),
     Trigger.AWAITS_MORE: Stimulus(
         lambda flight: flight.order(CommandKind.GOTO, "A3", waits=True), 0.04, hold=False

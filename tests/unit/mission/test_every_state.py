@@ -25,6 +25,8 @@ _SLOW = (
 SHADOWED = {
     # on the way back nothing is done at a node: it goes on before anything that takes time
     *((State(phase, intent), trigger) for phase in _AT_NODE for intent in _BACK for trigger in _SLOW),
+    # a view is given up before its time is over
+    (State(Phase.CLIMB, Intent.VISIT), Trigger.TIMED_OUT),
     # the search for the position has a limit of its own, which is shorter
     *((State(Phase.RELOCATE, intent), Trigger.TIMED_OUT) for intent in (Intent.VISIT, *_BACK)),
     # no shelf is scanned at the last stop, which is the pad's

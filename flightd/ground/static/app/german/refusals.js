@@ -295,6 +295,7 @@ export default {
   "heard again": "wieder gehört",
   "{stops} stops left; change the battery on the pad at {node}": "noch {stops} Halte; wechseln Sie den Akku auf dem Landeplatz bei {node}",
   "aisle {aisles}: {legs} legs at {speed} m/s, {nodes} nodes": "Gang {aisles}: {legs} Strecken mit {speed} m/s, {nodes} Knoten",
+  "no look at {n} places from {node}: not reached in time": "kein Blick auf {n} Plätze von {node} aus: nicht rechtzeitig erreicht",
   "{places} places to stop before": "vor {places} Plätzen zu halten",
   "aisle {aisle} {side}, level {level}: taken with {part} times the usual light": "Gang {aisle} {side}, Ebene {level}: aufgenommen mit dem {part}fachen des üblichen Lichts",
   "the front camera does not support exposure control: what is lit wrongly stays unreadable": "die Frontkamera lässt ihre Belichtung nicht stellen: Was falsch beleuchtet ist, bleibt unlesbar",

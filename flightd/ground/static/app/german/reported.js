@@ -185,6 +185,7 @@ export default {
   "arrived": "angekommen",
   "locations to scan": "Plätze zu lesen",
   "view reached": "Blickpunkt erreicht",
+  "view not reached in time": "Blickpunkt nicht rechtzeitig erreicht",
   "view scanned": "Blick gelesen",
   "dwell over": "Verweilen vorbei",
   "turned": "gedreht",
