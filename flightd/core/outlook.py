@@ -21,7 +21,8 @@ class Outlook:
     nodes that it flies over next, in order (not those far ahead).  `battery_left_s` is how long the charge
     above the reserve lasts in the air and `home_s` how long the way to the nearest charge pad takes; NaN: not
     known.  `plan` is the id of the order that the plan came with; empty: the configuration's.  At the node
-    `waits_at` its way ends, and it holds until it is told where to fly on; empty: it flies home."""
+    `waits_at` its way ends, and it holds until it is told where to fly on; empty: it flies home.  `lands_at`
+    is the node of the pad on which it comes down at last."""
 
     hazards: tuple[HazardSeen, ...] = ()
     obstacles: tuple[str, ...] = ()
@@ -30,6 +31,7 @@ class Outlook:
     home_s: float = math.nan
     plan: str = ""
     waits_at: str = ""
+    lands_at: str = ""
 
 
 NO_OUTLOOK = Outlook()

@@ -393,7 +393,8 @@ class Command:
     PLAN: to visit `nodes` in that order with the next start (none: what the configuration says) and to count
     what hangs on the shelf `levels` there (none: on all).  START with `plan`: only if the plan that stands is
     the one that was ordered with this id.  PLAN and GOTO that `waits`: at the end hold there until another
-    order, rather than fly home."""
+    order, rather than fly home.  GOTO that `lands`: on the pad of that node, to wait there for another
+    flight."""
 
     id: str
     kind: CommandKind
@@ -402,6 +403,7 @@ class Command:
     levels: tuple[int, ...] = ()
     plan: str = ""
     waits: bool = False
+    lands: bool = False
 
 
 class Phase(enum.StrEnum):

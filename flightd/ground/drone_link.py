@@ -155,6 +155,7 @@ class DroneLink:
                 seen_ns=seen_ns,
                 plan=act.plan,
                 waits=act.waits,
+                lands=act.lands,
             )
 
     async def plan_flight(

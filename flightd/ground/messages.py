@@ -78,6 +78,8 @@ class Act(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """`stamp_ns` of the newest status that the page had; 0: that of the station."""
     waits: bool = False
     """Only with goto: hold there, rather than fly home."""
+    lands: bool = False
+    """Only with goto: land on the pad there, and wait for another flight."""
 
 
 class SessionState(msgspec.Struct, frozen=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 from flightd.config.battery import BatteryConfig
 from flightd.config.schema import Config
@@ -23,7 +24,7 @@ _SHOWN = 3
 
 
 class ChosenPlans:
-    """Plans of one drone on one site, from the pad on which `first` begins.  Changes nothing."""
+    """Plans of one drone on one site, from the pad on which `first` begins.  Flies nothing."""
 
     def __init__(
         self, site: Site, first: FlightPlan, policy: HeadingPolicy, config: Config, scanner: AnyScanner
@@ -35,6 +36,10 @@ class ChosenPlans:
         self._legs = Legs(site, policy, self._pace)
         self._battery: BatteryConfig = config.battery
         self._scanner = scanner
+
+    def begin_at(self, node: str, yaw_rad: float) -> None:
+        """From the pad of another node from now on."""
+        self._first = replace(self._first, start=node, start_yaw_rad=yaw_rad)
 
     def plan(
         self,

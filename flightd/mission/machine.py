@@ -222,6 +222,7 @@ back."""
 _OVER_PAD: Mapping[tuple[Trigger, Intent], tuple[Phase, Cause]] = {
     (Trigger.DOWN_TO_SWAP, Intent.RETURN): (Phase.SWAP, Cause.TRIGGER),
     (Trigger.DOWN_TO_SWAP, Intent.HOME): (Phase.SWAP, Cause.TRIGGER),
+    (Trigger.DOWN_AS_TOLD, Intent.VISIT): (Phase.PREFLIGHT, Cause.TRIGGER),
     (Trigger.NOT_COUNTED, Intent.VISIT): (Phase.ABORTED, Cause.TRIGGER),
     (Trigger.NOT_COUNTED, Intent.RETURN): (Phase.ABORTED, Cause.TRIGGER),
     (Trigger.DISARMED, Intent.VISIT): (Phase.DONE, Cause.LANDED),

@@ -185,6 +185,7 @@ class Mission:
             home_s=home_s,
             plan=self._plan.id,
             waits_at=self._route.waits_at,
+            lands_at=self._route.lands_at,
         )
 
     def drain_events(self) -> tuple[Event, ...]:
@@ -216,7 +217,7 @@ class Mission:
         elif kind is CommandKind.GOTO:
             self._route.shorten(self._pose)
             halted = self.phase is Phase.HOLD
-            self._route.go_to(now_ns, command.node, waits=command.waits, halted=halted)
+            self._route.go_to(now_ns, command.node, waits=command.waits, lands=command.lands, halted=halted)
 
     def _take_plan(self, command: Command, now_ns: int) -> None:
         """Fly other nodes with the next start, or again what the configuration says; one that cannot be flown
@@ -314,6 +315,8 @@ class Mission:
         """What a landing on the pad is more than its end."""
         if self._charging.swaps:
             return {Trigger.DOWN_TO_SWAP}
+        if self._route.lands_as_told:
+            return {Trigger.DOWN_AS_TOLD}
         return {Trigger.NOT_COUNTED} if self._scan.blind else set()
 
     def _lost(self, action: LossAction, trigger: Trigger, now_ns: int) -> set[Trigger]:
@@ -402,6 +405,8 @@ class Mission:
     def _enter(self, s: MissionInputs, trigger: Trigger) -> None:
         """What the phase that begins starts with."""
         match self.phase:
+            case Phase.PREFLIGHT if trigger is Trigger.DOWN_AS_TOLD:
+                self._stand(s.now_ns)
             case Phase.PREFLIGHT:
                 self._await_start()
             case Phase.TAKE_OFF:
@@ -421,6 +426,15 @@ class Mission:
             case Phase.RECOVER if s.vehicle is not None:
                 text = f"found flying in mode {s.vehicle.mode} at {s.height_m:.1f} m: level, then landing"
                 self._events.report(s.now_ns, EventLevel.ERROR, "restart", text)
+
+    def _stand(self, now_ns: int) -> None:
+        """On the pad that it was told: the next flight begins here, and somebody has to order it."""
+        goal = self.goal
+        self._steering.anchor = (goal.x_m, goal.y_m)
+        self._clearance.autostart = False
+        self._charging.begin_anew()
+        self._route.begin(self._plan.begin_at(goal.node, goal.yaw_rad))
+        self._events.report(now_ns, EventLevel.INFO, "pad", f"stands on the pad at {goal.node}")
 
     def _go_on(self, s: MissionInputs) -> None:
         """To the next stop, which is the way back where the battery does not reach another one."""

@@ -8,7 +8,7 @@ from flightd.config.schema import Config
 from flightd.core.planned_flight import PlannedFlight, StandingPlan
 from flightd.core.types import Command
 from flightd.mission.chosen_plan import ChosenPlans
-from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
 from flightd.mission.scan.no_scan import AnyScanner
 from flightd.site.site import Site
 
@@ -19,6 +19,7 @@ class PlanInHand:
     def __init__(
         self, site: Site, configured: FlightPlan, policy: HeadingPolicy, config: Config, scanner: AnyScanner
     ) -> None:
+        self._site, self._policy = site, policy
         self.plan = self._configured = configured
         self.id = ""
         """Of the command that chose it; empty: it is the configured one."""
@@ -38,6 +39,15 @@ class PlanInHand:
         text = f"{self.plan.nodes} nodes" if command.nodes else "as configured again"
         text += f", counted on level {', '.join(map(str, self._levels))}" if self._levels else ""
         return f"{text}, to hold at the last" if self.plan.waits else text
+
+    def begin_at(self, node: str, yaw_rad: float) -> FlightPlan:
+        """Stand on the pad of another node from now on; what is flown from there until another plan is
+        chosen: home."""
+        home = self._configured.home
+        self._configured = make_plan(self._site, (), node, home, self._policy, yaw_rad)
+        self._chosen.begin_at(node, yaw_rad)
+        self.plan, self.id, self._levels = self._configured, "", ()
+        return self.plan
 
     def standing(self, visited: Sequence[str], remaining: tuple[str, ...]) -> StandingPlan:
         """What is told of it."""

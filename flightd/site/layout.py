@@ -237,6 +237,8 @@ def _check_pads(pads: tuple[Pad, ...], nodes: dict[str, Node]) -> tuple[Pad, ...
             raise LayoutError(f"pad[{i}] ({pad.id}).node", f"there is no node {pad.node}")
         if any(pad.id == other.id or pad.node == other.node for other in pads[:i]):
             raise LayoutError(f"pad[{i}] ({pad.id})", "its id or node is taken by an earlier pad")
+        if pad.shared and (pad.start or not pad.charge):
+            raise LayoutError(f"pad[{i}] ({pad.id}).shared", "a shared pad charges, and has start = false")
     return pads
 
 

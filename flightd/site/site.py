@@ -112,7 +112,8 @@ class PadSign(enum.StrEnum):
 @dataclass(frozen=True, slots=True)
 class Pad:
     """A square of floor on a node, its centre `offset_m` (x, y) off; missions may `start` on it, batteries
-    change where `charge`."""
+    change where `charge`.  On a `shared` one a drone comes down only where it is told to: another one may
+    stand there."""
 
     id: str
     node: str
@@ -121,6 +122,7 @@ class Pad:
     charge: bool = True
     offset_m: tuple[float, float] = (0.0, 0.0)
     sign: PadSign = PadSign.MAT
+    shared: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,6 +293,12 @@ class Site:
             raise InputError(
                 f"site {self.name}: no node {node!r}; nodes are named like {next(iter(self.nodes))}"
             )
+
+    @property
+    def own_charge_pads(self) -> tuple[Pad, ...]:
+        """Those to which a drone turns by itself: where batteries change and no other drone stands, else the
+        home pad."""
+        return tuple(pad for pad in self.pads if pad.charge and not pad.shared) or (self.home,)
 
     def pad_centre(self, pad: Pad) -> tuple[float, float]:
         """Where the middle of a pad is on the map, metres."""

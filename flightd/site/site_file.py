@@ -142,6 +142,7 @@ def site_toml(site: Site) -> str:
         parts += [f"offset_m = [{pad.offset_m[0]!r}, {pad.offset_m[1]!r}]"] if any(pad.offset_m) else []
         parts += [f'sign = "{pad.sign}"'] if pad.sign is not PadSign.MAT else []
         parts += [f"{key} = false" for key, on in (("start", pad.start), ("charge", pad.charge)) if not on]
+        parts += ["shared = true"] if pad.shared else []
     for marker in site.markers:
         parts += ["", "[[marker]]", f"id = {marker.id}", f"dictionary = {quoted(marker.dictionary)}"]
         parts += [f"x_m = {marker.x_m!r}", f"y_m = {marker.y_m!r}", f"size_m = {marker.size_m!r}"]

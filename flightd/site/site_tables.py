@@ -91,6 +91,7 @@ class _PadTable(Section):
     charge: bool = True
     offset_m: tuple[_PadOffset, _PadOffset] = (0.0, 0.0)
     sign: PadSign = PadSign.MAT
+    shared: bool = False
 
 
 class _MarkerTable(Section):

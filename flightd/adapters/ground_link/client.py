@@ -171,10 +171,12 @@ class GroundClient:
         seen_ns: int | None = None,
         plan: str = "",
         waits: bool = False,
+        lands: bool = False,
     ) -> Accepted:
         """Give a command; sent again until it is answered, done once.  It is for the flight `session`, given
         by who saw the status of `seen_ns`; left out: this client's, and the newest that it heard.  A start
-        may name the `plan` that it is for; a goto that `waits` leads to a node to hold there."""
+        may name the `plan` that it is for; a goto that `waits` leads to a node to hold there, one that
+        `lands` down onto its pad."""
         order = Order(
             version=VERSION,
             id=order_id or _new_id(),
@@ -184,6 +186,7 @@ class GroundClient:
             session=self.session if session is None else session,
             seen_ns=self._seen_ns if seen_ns is None else seen_ns,
             waits=waits,
+            lands=lands,
         )
         return await self._ask(order, Accepted)
 

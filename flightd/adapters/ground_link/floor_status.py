@@ -47,7 +47,9 @@ def floor_status(site: Site) -> FloorStatus:
             FloorArea(area.x0_m, area.y0_m, area.x1_m, area.y1_m, area.from_m, finite(area.to_m))
             for area in site.keep_outs
         ),
-        pads=tuple(FloorPad(pad.id, *site.pad_centre(pad), pad.size_m, pad.charge) for pad in site.pads),
+        pads=tuple(
+            FloorPad(pad.id, *site.pad_centre(pad), pad.size_m, pad.charge, pad.shared) for pad in site.pads
+        ),
         ways=tuple(
             FloorWay(edge.a, edge.b, site.is_closed(edge))
             for edge in site.edges

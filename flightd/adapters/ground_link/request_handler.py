@@ -84,6 +84,7 @@ class RequestHandler:
         optics: Sequence[CameraOptics] = (),
     ) -> None:
         self._nodes = frozenset(site.nodes)
+        self._pads = frozenset(pad.node for pad in site.pads)
         self._floor = floor_status(site)
         self._session = session
         self._audit = audit
@@ -194,7 +195,9 @@ class RequestHandler:
 
     def _order(self, order: Order, peer: Peer, now_ns: int) -> Answer:
         """Accept, refuse or repeat an order, and write down which."""
-        command = Command(order.id, order.command, order.node, plan=order.plan, waits=order.waits)
+        command = Command(
+            order.id, order.command, order.node, plan=order.plan, waits=order.waits, lands=order.lands
+        )
         repeated = self._repeated(command, peer)
         if repeated is not None:
             return repeated
@@ -323,6 +326,16 @@ class RequestHandler:
                 order.waits and kind not in _WAIT,
                 Code.MALFORMED,
                 "only goto and a plan over nodes end by waiting",
+            ),
+            (
+                order.lands and (kind is not CommandKind.GOTO or order.waits),
+                Code.MALFORMED,
+                "only a goto that does not wait lands on another pad",
+            ),
+            (
+                order.lands and node in self._nodes - self._pads,
+                Code.NODE,
+                f"no pad at {node}",
             ),
             (
                 bool(node) and node not in self._nodes,

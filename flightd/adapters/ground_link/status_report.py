@@ -59,6 +59,7 @@ def status_report(snapshot: Snapshot, session: str, seq: int, link: LinkReport) 
         home_s=finite(snapshot.outlook.home_s),
         plan=snapshot.outlook.plan,
         waits_at=snapshot.outlook.waits_at,
+        lands_at=snapshot.outlook.lands_at,
     )
 
 

@@ -145,7 +145,7 @@ class Sorties:
 
     def out_of_reach(self, nodes: Sequence[str]) -> tuple[str, ...]:
         """The nodes that cannot be visited from any charge pad on one full battery."""
-        pads = [pad.node for pad in self._site.pads if pad.charge]
+        pads = [pad.node for pad in self._site.own_charge_pads]
         return tuple(
             node
             for node in dict.fromkeys(nodes)
@@ -177,11 +177,10 @@ class Sorties:
 
     def _ways_back(self, node: str, *, in_need: bool) -> list[WayBack]:
         found = []
-        for pad in self._site.pads:
-            if pad.charge:
-                try:
-                    seconds = self._legs.way_s(node, pad.node, against_one_way=in_need)
-                except NoWayError:
-                    continue
-                found.append(WayBack(pad.node, seconds + self._legs.pace.land_s))
+        for pad in self._site.own_charge_pads:
+            try:
+                seconds = self._legs.way_s(node, pad.node, against_one_way=in_need)
+            except NoWayError:
+                continue
+            found.append(WayBack(pad.node, seconds + self._legs.pace.land_s))
         return found

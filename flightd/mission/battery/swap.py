@@ -125,9 +125,13 @@ class BatterySwap:
 
     def await_battery(self, now_ns: int) -> None:
         """Stand on the pad with the rest of the plan ahead."""
+        self.begin_anew()
+        self._route.resume_from_pad(now_ns)
+
+    def begin_anew(self) -> None:
+        """Stand on a pad; whatever the last battery was short of is over."""
         self._done_before = self._done
         self._short = self.presses = False
-        self._route.resume_from_pad(now_ns)
 
     def _go_charge(self, now_ns: int, reason: Reason, *, in_need: bool) -> Trigger:
         """Fly to the charge pad that is reached soonest; with batteries swapped the rest is flown later."""

@@ -43,13 +43,15 @@ class Itinerary:
         self.visited: list[str] = []
         self._run: tuple[str, ...] = ()
         self._waits = plan.waits
+        self._told_pad = ""
         self.wanted: Callable[[str], bool] = lambda _node: False
         """Whether anything is left to count at a node."""
 
     def begin(self, plan: FlightPlan) -> None:
-        """Fly this plan instead, on the ground: from the same pad, before anything was visited."""
+        """Fly this plan instead, on the ground."""
         self._stops, self._next, self._run = list(plan.stops), 0, ()
-        self._waits = plan.waits
+        self.stand = (plan.start, plan.start_yaw_rad)
+        self._waits, self._left_over, self._told_pad = plan.waits, (), ""
 
     @property
     def goal(self) -> Stop:
@@ -106,6 +108,16 @@ class Itinerary:
         """The node ahead where it will hold, or holds, until it is told where to fly on; empty: it flies
         home."""
         return next((stop.node for stop in self._stops[self._next :] if stop.waits), "")
+
+    @property
+    def lands_at(self) -> str:
+        """The node of the pad on which it comes down at last."""
+        return self._stops[-1].node
+
+    @property
+    def lands_as_told(self) -> bool:
+        """It comes down on a pad that it was told, and waits there for another flight."""
+        return self._told_pad == self.lands_at
 
     @property
     def left_over(self) -> tuple[str, ...]:
@@ -209,7 +221,7 @@ class Itinerary:
     def turn_home(self, now_ns: int, reason: Reason, *, in_need: bool, pad: str | None = None) -> None:
         """Fly to the home pad or another; by the shortest way, against one-way lines too, `in_need` and where
         no legal way leads there."""
-        self._left_over = self.remaining
+        self._left_over, self._told_pad = self.remaining, ""
         self.why_home = reason
         self._events.report(now_ns, EventLevel.WARNING, "home", in_words(reason))
         try:
@@ -217,20 +229,23 @@ class Itinerary:
         except NoWayError:
             self._replan([], in_need=True, home=pad)
 
-    def go_to(self, now_ns: int, node: str, *, waits: bool = False, halted: bool = False) -> None:
-        """Fly over `node` home, as ordered, or hold there (`waits`): an order to fly home from where it would
-        hold flies home.  One that cannot be followed changes nothing.  `halted`: it begins its leg anew."""
+    def go_to(
+        self, now_ns: int, node: str, *, waits: bool = False, lands: bool = False, halted: bool = False
+    ) -> None:
+        """Fly over `node` home, as ordered, or hold there (`waits`), or land on the pad there (`lands`): an
+        order to fly home from where it would hold flies home.  One that cannot be followed changes nothing.
+        `halted`: it begins its leg anew."""
         if node not in self._site.nodes:
             why = f"no node {node!r} on site {self._site.name}"
         else:
             holds = self.goal.waits
-            ends = not waits and self.goal.node == node == self.waits_at
+            ends = lands or (not waits and self.goal.node == node == self.waits_at)
             try:
-                self._replan([] if ends else [node], waits=waits)
+                self._replan([] if ends else [node], waits=waits, home=node if lands else None)
             except NoWayError as err:
                 why = f"goto {node} refused: {err}"
             else:
-                self._waits = waits
+                self._waits, self._told_pad = waits, node if lands else ""
                 self._next += holds and halted  # it is there already
                 return
         self._events.report(now_ns, EventLevel.WARNING, "command", why)

@@ -141,6 +141,10 @@ def test_a_plan_over_nodes_and_a_goto_may_end_by_waiting_and_nothing_else() -> N
         (CommandKind.GOTO, True),
     ]
     refused(flies.order("pause", waits=True), Code.MALFORMED)
+    refused(flies.order("goto", node="A3", waits=True, lands=True), Code.MALFORMED)
+    refused(flies.order("home", lands=True), Code.MALFORMED)
+    refused(flies.order("goto", node="A3", lands=True), Code.NODE)
+    assert isinstance(flies.order("goto", node="A1", lands=True), Accepted)
     refused(rig.plan(waits=True), Code.MALFORMED)
 
 

@@ -128,6 +128,12 @@ class Flight:
         assert self.phase is phase, self.mission.reason
 
     def order(
-        self, kind: CommandKind, node: str = "", nodes: tuple[str, ...] = (), *, waits: bool = False
+        self,
+        kind: CommandKind,
+        node: str = "",
+        nodes: tuple[str, ...] = (),
+        *,
+        waits: bool = False,
+        lands: bool = False,
     ) -> None:
-        self.mission.command(Command("1", kind, node, nodes, waits=waits), self.now_ns)
+        self.mission.command(Command("1", kind, node, nodes, waits=waits, lands=lands), self.now_ns)

@@ -291,6 +291,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.PILOT_TOOK: sensed(in_control=False),
     Trigger.STOP: ordered(CommandKind.STOP),
     Trigger.DOWN_TO_SWAP: sensed(armed=False),
+    Trigger.DOWN_AS_TOLD: sensed(armed=False),
     Trigger.NOT_COUNTED: replace(sensed(armed=False), scanning=(Phase.LAND,)),
     Trigger.DISARMED: sensed(armed=False),
     Trigger.VANISHED: sensed(61.0, telemetry_age_s=70.0),

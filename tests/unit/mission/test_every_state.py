@@ -44,8 +44,9 @@ _ON_PAD = {
     (State(Phase.LAND, Intent.RETURN), Trigger.NOT_COUNTED),
     (State(Phase.LAND, Intent.RETURN), Trigger.DISARMED),
     (State(Phase.LAND, Intent.HOME), Trigger.DOWN_TO_SWAP),
+    (State(Phase.LAND, Intent.VISIT), Trigger.DOWN_AS_TOLD),
 }
-"""Landings that depend on what was done before: each has its own test below."""
+"""Landings that depend on what was done before: each has its own test below, or in `test_pad_as_told`."""
 _ORDERS = {trigger: kind for kind, trigger in COMMANDS.items()}
 
 

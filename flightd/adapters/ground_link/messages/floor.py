@@ -62,6 +62,7 @@ class FloorPad(msgspec.Struct, frozen=True):
     y_m: Annotated[float, Meta(description="of its centre")]
     size_m: Annotated[float, Meta(description="length of its sides")]
     charge: Annotated[bool, Meta(description="batteries are charged or changed here")]
+    shared: Annotated[bool, Meta(description="drones come down here only where they are told to")] = False
 
 
 class FloorWay(msgspec.Struct, frozen=True):

@@ -138,6 +138,12 @@ class StatusReport(msgspec.Struct, frozen=True):
             "flies home; null: a daemon that always does"
         ),
     ] = None
+    lands_at: Annotated[
+        str | None,
+        Meta(
+            description="node of the pad on which it comes down at last; null: a daemon that takes no `lands`"
+        ),
+    ] = None
 
 
 class EventReport(msgspec.Struct, frozen=True):

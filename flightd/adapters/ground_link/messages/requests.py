@@ -49,6 +49,10 @@ class Order(ClientRequest, frozen=True, tag="command", omit_defaults=True):
     waits: Annotated[
         bool, Meta(description="only with goto: hold there until another order, rather than fly home")
     ] = False
+    lands: Annotated[
+        bool,
+        Meta(description="only with goto: land on the pad of that node, and wait there for another flight"),
+    ] = False
 
 
 class PlanFlight(ClientRequest, frozen=True, tag="plan_flight", omit_defaults=True):

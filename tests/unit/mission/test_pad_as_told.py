@@ -1,0 +1,101 @@
+"""A drone that is told to land on another pad: it waits there for its next flight, and begins that from
+there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from flightd.core.errors import InputError
+from flightd.core.types import CommandKind, LandedState, Phase
+from flightd.site.site import Pad
+from flightd.site.site_file import parse_site, site_toml
+from tests.unit.mission import shelves
+from tests.unit.mission.configured import configured
+from tests.unit.mission.driven import Flight
+from tests.unit.mission.states import start
+
+GOTO, PLAN, START, HOME = CommandKind.GOTO, CommandKind.PLAN, CommandKind.START, CommandKind.HOME
+DOCK = Pad("dock", "A3", 0.5, start=False, shared=True)
+HALL = replace(shelves.SITE, pads=(*shelves.SITE.pads, DOCK))
+
+
+def flown() -> Flight:
+    """A flight that holds over A2."""
+    flight = Flight(configured(dwell_s=0.5, autostart=False), HALL)
+    flight.run(0.2)
+    flight.order(PLAN, nodes=("A2",), waits=True)
+    start(flight)
+    flight.to(Phase.HOLD, 120.0)
+    return flight
+
+
+def down(flight: Flight) -> Phase:
+    """It has landed; what became of it."""
+    flight.to(Phase.LAND, 120.0)
+    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.run(0.02, follow=False)
+    return flight.phase
+
+
+def lands_at(flight: Flight) -> str:
+    return flight.mission.outlook(flight.now_ns).lands_at
+
+
+def test_it_waits_on_the_pad_that_it_was_told_and_flies_on_from_there() -> None:
+    flight = flown()
+    assert lands_at(flight) == HALL.home.node
+    flight.order(GOTO, "A3", lands=True)
+    assert lands_at(flight) == "A3"
+    assert down(flight) is Phase.PREFLIGHT
+    assert flight.mission.stand[0] == "A3"
+    flight.run(30.0)
+    assert flight.phase is Phase.PREFLIGHT, "nobody ordered another flight"
+    assert {PLAN, START} <= flight.mission.possible_commands
+    assert flight.mission.planned(("A2",), (), best_order=False).way[0] == "A3"
+    flight.order(PLAN, nodes=("A2",), waits=True)
+    start(flight)
+    flight.to(Phase.HOLD, 120.0)
+    flight.order(HOME)
+    assert lands_at(flight) == HALL.home.node
+    assert down(flight) is Phase.ABORTED
+
+
+def test_where_it_holds_already_it_comes_down() -> None:
+    flight = flown()
+    flight.order(GOTO, "A3", waits=True)
+    flight.to(Phase.FOLLOW)
+    flight.to(Phase.HOLD, 120.0)
+    flight.order(GOTO, "A3", lands=True)
+    assert down(flight) is Phase.PREFLIGHT
+    assert flight.mission.stand[0] == "A3"
+
+
+@pytest.mark.parametrize("what", ["battery", "person", "another node"])
+def test_what_turns_it_from_there_brings_it_home(what: str) -> None:
+    flight = flown()
+    flight.order(GOTO, "A3", lands=True)
+    flight.to(Phase.FOLLOW)
+    if what == "battery":
+        flight.set(battery_frac=0.15)
+        flight.run(0.04)
+    elif what == "person":
+        flight.order(HOME)
+    else:
+        flight.order(GOTO, "A2")
+    assert lands_at(flight) == HALL.home.node
+    assert down(flight) in {Phase.ABORTED, Phase.DONE}
+
+
+def test_by_itself_it_never_turns_to_a_pad_that_is_shared() -> None:
+    assert [pad.id for pad in HALL.own_charge_pads] == [HALL.home.id]
+    only = replace(HALL, pads=(replace(HALL.home, charge=False), DOCK))
+    assert [pad.id for pad in only.own_charge_pads] == [HALL.home.id], "where none charges, home"
+
+
+def test_a_shared_pad_is_written_and_read_and_nobody_starts_there_at_first() -> None:
+    text = site_toml(HALL)
+    assert parse_site(text, "hall").pads == HALL.pads
+    with pytest.raises(InputError, match=r"pad\[1\] \(dock\).shared: a shared pad charges"):
+        parse_site(text.replace("start = false\nshared", "shared"), "hall")
