@@ -43,14 +43,16 @@ _COUNTS_S = 6.0
 _LASTS_S = {Phase.TAKE_OFF: 3.0, Phase.HOVER: 1.0, Phase.LAND: 3.0, Phase.RECOVER: 3.0}
 
 
-def hall(drone: str, name: str = "hall", pad: str = "") -> Site:
+def hall(drone: str, name: str = "hall", pad: str = "", docks: Sequence[str] = ()) -> Site:
     """Two aisles of three nodes between the spurs at their ends, as this drone knows it; its own `pad` may be
-    at another node."""
+    at another node.  Where there are `docks`, at these nodes, batteries are charged there alone."""
     at = PADS | ({drone: pad} if pad else {})
     pads = [
-        Pad("home" if each == drone else f"pad-{each}", node, 0.5, charge=each == drone)
+        Pad("home" if each == drone else f"pad-{each}", node, 0.5, charge=each == drone and not docks)
         for each, node in at.items()
+        if node not in docks
     ]
+    pads += [Pad(f"dock-{node}", node, 0.5, start=False, shared=True) for node in docks]
     aisles = [
         Aisle(aisle, 0.0, y_m, _STEPS_M, shelf_distance_m=1.2, shelf_height_m=2.5)
         for aisle, y_m in (("A", 0.0), ("B", 3.0))
@@ -70,6 +72,9 @@ class PaperDrone:
         self.heard = self.sees = True
         self.counts = self.never_starts = False
         self.battery_frac = 0.9
+        self.knows_docks = True
+        self.charges_per_s = 0.0
+        """Where it stands on a shared pad."""
         self.refuses: dict[CommandKind, FlightdError] = {}
         """Commands that have no effect, and how that shows."""
         self.plan = ""
@@ -90,7 +95,9 @@ class PaperDrone:
         self._session += 1
         self.phase, self.way, self.paused, self.left_s = Phase.PREFLIGHT, [], False, 900.0
         self.waits = False
-        self.ends_as = Phase.DONE
+        self.stand = self.site.home.node
+        """The node on whose pad it believes to stand before a flight."""
+        self._end, self.ends_as = self.stand, Phase.DONE
         self._timer_s = 0.0
         self._begins_in_air = self.truth.z_m > 0.0 and not on_pad
         if self._begins_in_air:
@@ -140,11 +147,12 @@ class PaperDrone:
             case CommandKind.START:
                 self.phase, self._timer_s = Phase.TAKE_OFF, 0.0
                 self._fly_over(self._nodes, waits=self._plan_waits)
-            case CommandKind.GOTO if self.waits_at == act.node == here and not act.waits:
+            case CommandKind.GOTO if self.waits_at == act.node == here and not (act.waits or act.lands):
                 self._fly_over([here], waits=False)
             case CommandKind.GOTO:
                 rests = self._is_at_end and self.phase is Phase.HOLD
-                self._fly_over([act.node] if rests else [here, act.node], waits=act.waits)
+                end = act.node if act.lands else ""
+                self._fly_over([act.node] if rests else [here, act.node], waits=act.waits, end=end)
             case CommandKind.PAUSE | CommandKind.RESUME:
                 self.paused = act.command is CommandKind.PAUSE
             case CommandKind.HOME:
@@ -159,7 +167,7 @@ class PaperDrone:
         if not how.get("dry"):
             self.plan, self._nodes, self._plan_waits = order_id, tuple(nodes), how.get("waits", False)
             self._event("command", "plan")
-        way = (self.site.home.node, *nodes, self.site.home.node)
+        way = (self.stand, *nodes, self.site.home.node)
         return Planned(
             version=1, request=order_id, nodes=tuple(nodes), levels=tuple(levels), way=way,
             places=4 * self.counts, way_m=40.0, seconds=80.0, batteries=1, charge=1.0, battery_s=900.0,
@@ -182,7 +190,8 @@ class PaperDrone:
                 self._tell(self.name, "events", tuple(self._events))
                 self._tell(self.name, "status", self.status)
 
-    def _fly_over(self, nodes: Sequence[str], *, waits: bool) -> None:
+    def _fly_over(self, nodes: Sequence[str], *, waits: bool, end: str = "") -> None:
+        self._end = end or self.site.home.node
         home = self._home_from(nodes[-1])
         self.way = [*nodes, *([nodes[-1]] if waits else []), *home]
         self.waits, self._waits_before = waits, len(home)
@@ -197,10 +206,12 @@ class PaperDrone:
 
     def _home_from(self, node: str) -> list[str]:
         """Onto the pad: its node comes twice where the drone is there."""
-        return [*self.site.path(node, self.site.home.node)[1:], self.site.home.node]
+        return [*self.site.path(node, self._end)[1:], self._end]
 
     def _fly(self) -> None:
         self._timer_s += STEP_S
+        if self.phase is Phase.PREFLIGHT and self.stand != self.site.home.node:
+            self.battery_frac = min(self.battery_frac + STEP_S * self.charges_per_s, 1.0)
         lasts_s = _COUNTS_S if self.counts and self.phase is Phase.HOVER else _LASTS_S.get(self.phase, 0.0)
         if self._timer_s < lasts_s and not self._holds:
             return
@@ -221,7 +232,10 @@ class PaperDrone:
                 self._begin(Phase.FOLLOW)
             case Phase.LAND:
                 self.truth.z_m = 0.0
-                self._begin(self.ends_as)
+                as_told = self.ends_as is Phase.DONE and self._end != self.site.home.node
+                self.stand = self._end if as_told else self.stand
+                self.plan = "" if as_told else self.plan
+                self._begin(Phase.PREFLIGHT if as_told else self.ends_as)
             case Phase.RECOVER:
                 self.come_down()
             case _:
@@ -255,6 +269,8 @@ class PaperDrone:
     def _possible(self) -> tuple[CommandKind, ...]:
         if self.phase is Phase.PREFLIGHT:
             return CommandKind.PLAN, CommandKind.START
+        if self.phase is Phase.LAND:
+            return (CommandKind.LAND, CommandKind.STOP)
         back = not self.plan
         return (
             tuple(kind for kind in _IN_AIR if not (back and kind is CommandKind.GOTO)) if self.flies else ()
@@ -276,5 +292,5 @@ class PaperDrone:
             nodes_planned=0, height_m=self.truth.z_m, position=at, lines=(), lines_age_s=0.0, vehicle=vehicle,
             frames=0, frames_dropped=0, fps=30.0, latency_ms={}, link=LinkReport(0, 0, 0, 0, 0),
             way=tuple(self.way), possible=self._possible, plan=self.plan, battery_left_s=self.left_s,
-            waits_at=self.waits_at,
+            waits_at=self.waits_at, lands_at=self._end if self.knows_docks else None,
         )  # fmt: skip

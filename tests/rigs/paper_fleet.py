@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
 from typing import Any, TypeVar, cast
 
 import pytest
@@ -141,9 +141,10 @@ def fly(
     counts: bool = False,
     memory: FleetMemory | None = None,
     charged_frac: float = 0.0,
+    docks: Sequence[str] = (),
 ) -> PaperFleet:
     """Do `go` while the fleet flies."""
-    sites = {name: hall(name) for name in names}
+    sites = {name: hall(name, docks=docks) for name in names}
     fleet = PaperFleet(sites, memory=memory, charged_frac=charged_frac)
     for drone in fleet.drones.values():
         drone.counts = counts

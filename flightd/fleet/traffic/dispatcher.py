@@ -38,7 +38,8 @@ _WITH_SPARE: Final = _SLOWER * (1 + _SPARE_FRAC)
 class DroneReport:
     """What a drone tells: how many actions of its life are done, its charge, by how much its position is
     doubted, and whether it is unable to fly on; `not_counted` has the nodes at which a count failed, and
-    why.  `charging`: whether it is charged where it stands, None where it does not say."""
+    why.  `charging`: whether it is charged where it stands, None where it does not say; `level`: how full
+    its battery is for a dock, where `charge` tells something else."""
 
     drone: str
     done: int
@@ -47,6 +48,7 @@ class DroneReport:
     failed: bool = False
     not_counted: Mapping[str, str] = field(default_factory=dict)
     charging: bool | None = None
+    level: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +60,10 @@ class Commands:
 
 
 class Dispatcher:
-    """The fleet of one floor.  Where there are `docks`, batteries are filled there alone.  With `shares` no
-    drone is given more than its part of what waits, for all that could fly now, and a step plans one tour at
-    most: the next one follows soon."""
+    """The fleet of one floor.  Where there are `docks`, batteries are filled there alone, up to `full_at`
+    (None: as `endurance` says).  With `shares` no drone is given more than its part of what waits, for all
+    that could fly now, and a step plans one tour at most: the next one follows soon.  Drones that `keep_home`
+    always keep what brings them to their own pads, and are sent to a dock from the air whatever waits."""
 
     def __init__(
         self,
@@ -70,13 +73,17 @@ class Dispatcher:
         *,
         shares: bool = False,
         docks: Sequence[Dock] = (),
+        full_at: float | None = None,
+        keep_home: bool = False,
     ) -> None:
-        self._shares = shares
+        self._shares, self._keep_home = shares, keep_home
         self.control = control
         self.queue = queue
         self._endurance = endurance
         self._distances = Distances(control.net)
-        self.docks = DockQueue(control, self._distances, docks, endurance.starts_at)
+        full = endurance.starts_at if full_at is None else full_at
+        self.docks = DockQueue(control, self._distances, docks, full, returns=keep_home)
+        self._level: dict[str, float] = {}
         self._charging: dict[str, bool | None] = {}
         self._charge: dict[str, float] = {}
         self._tours: dict[str, set[str]] = {}
@@ -189,6 +196,7 @@ class Dispatcher:
     def _hear(self, report: DroneReport, now_ms: int) -> None:
         drone, course = report.drone, self.control.drones[report.drone]
         self._charge[drone], self._charging[drone] = report.charge, report.charging
+        self._level[drone] = report.charge if report.level is None else report.level
         self._heard_ms[drone] = now_ms
         if drone in self._avoided and not course.failed:
             counts = [action.vertex for action in course.base if action.act is Act.COUNT]
@@ -327,9 +335,11 @@ class Dispatcher:
         return self._endurance.left_ms(self._charge.get(drone, 1.0)) - spare_ms
 
     def _fill_batteries(self, now_ms: int) -> None:
-        """As long as there is something to count with them."""
-        if not self.docks.are_there or not (self.queue.open or self.queue.given):
+        """As long as there is something to count with them, on the ground at least."""
+        works = bool(self.queue.open or self.queue.given)
+        if not self.docks.are_there or not (works or self._keep_home):
             return
+        vertices, holders = self.control.lanes.vertices, self.docks.holders.values()
         known: dict[str, Standing] = {}
         left_ms: dict[str, int] = {}
         for drone, course in self.control.drones.items():
@@ -338,8 +348,9 @@ class Dispatcher:
                 and not course.failed
                 and course.doubt_m <= 0.0
                 and drone not in self._held
+                and (works or drone in holders or vertices[course.place].pad is None)
             ):
-                known[drone] = Standing(self._charge[drone], self._charging[drone])
+                known[drone] = Standing(self._level[drone], self._charging[drone])
                 spared_ms = self._endurance.left_ms(self._charge[drone]) - _SPARE_MS
                 left_ms[drone] = int(spared_ms / _WITH_SPARE)
         self.docks.step(now_ms, known, left_ms)

@@ -47,11 +47,19 @@ class KeptTries:
 
 
 class DockQueue:
-    """The docks of one floor; without any, every drone is charged on its own pad."""
+    """The docks of one floor; without any, every drone is charged on its own pad.  Where a drone `returns` it
+    flies to no dock from which it would not come to its own pad."""
 
     def __init__(
-        self, control: TrafficControl, distances: Distances, docks: Sequence[Dock], full_enough: float
+        self,
+        control: TrafficControl,
+        distances: Distances,
+        docks: Sequence[Dock],
+        full_enough: float,
+        *,
+        returns: bool = False,
     ) -> None:
+        self._returns = returns
         self._control = control
         self._distances = distances
         self._docks = {dock.name: dock for dock in docks}
@@ -78,6 +86,16 @@ class DockQueue:
         course = self._control.drones[drone]
         return self._homes.setdefault(drone, course.ends[0]) if self._docks else course.ends[0]
 
+    @property
+    def docks(self) -> tuple[Dock, ...]:
+        """All of them."""
+        return tuple(self._docks.values())
+
+    @property
+    def holders(self) -> Mapping[str, str]:
+        """Dock to drone: from when it is chosen until that drone has left it."""
+        return self._holder
+
     def flies_on(self, drone: str, home: int) -> bool:
         """A drone entered anew that comes home to this pad.  Whether it may stay where it is: on a dock."""
         self._homes[drone] = home
@@ -100,7 +118,8 @@ class DockQueue:
         """What has to be left of a battery on the drone's own pad: the way to a dock."""
         if not self._docks:
             return 0
-        return min(self._way_ms(self.home(drone), dock) for dock in self._docks.values())
+        ways = ((self._way_ms(self.home(drone), dock), self._back_ms(drone, dock)) for dock in self.docks)
+        return min(map(sum, ways))
 
     def step(self, now_ms: int, known: dict[str, Standing], left_ms: dict[str, int]) -> None:
         """Free docks, land anew, let those go that are done, and send who waits.  `known` are the drones that
@@ -123,7 +142,8 @@ class DockQueue:
         """Of those who are neither on it nor going there; who stands on one has it, however he came there."""
         for name, drone in list(self._holder.items()):
             course, place = self._control.drones[drone], self._docks[name].place
-            if place not in (course.place, _end_of(course)) and not course.wreck:
+            may_be = place in self._control.avoided(drone) if course.wreck else place == _end_of(course)
+            if place != course.place and not may_be:
                 del self._holder[name]
         at = {dock.place: name for name, dock in self._docks.items() if name not in self._holder}
         for drone, course in self._control.drones.items() if at else ():
@@ -176,7 +196,11 @@ class DockQueue:
             ways = {
                 dock.name: self._way_ms(at, dock) for dock in self._docks.values() if dock.place not in shut
             }
-            near = {name: way_ms for name, way_ms in ways.items() if way_ms <= left_ms[drone]}
+            near = {
+                name: way_ms
+                for name, way_ms in ways.items()
+                if way_ms + self._back_ms(drone, self._docks[name]) <= left_ms[drone]
+            }
             shunned = self._shunned.get(drone, set())
             others = {name: way_ms for name, way_ms in near.items() if name not in shunned}
             if not others:
@@ -205,7 +229,8 @@ class DockQueue:
         """To a dock, if its battery lasts for that with all that it has to wait for; home otherwise."""
         if not self._give(drone, (), dock, now_ms):
             return False
-        if self._control.drones[drone].ahead[-1].end_ms - now_ms <= left_ms:
+        way_ms = self._control.drones[drone].ahead[-1].end_ms - now_ms
+        if way_ms + self._back_ms(drone, dock) <= left_ms:
             return True
         self._go_home(drone, now_ms)
         return False
@@ -240,6 +265,10 @@ class DockQueue:
 
     def _go_home(self, drone: str, now_ms: int) -> None:
         self._control.give(drone, (), (self.home(drone),), now_ms)
+
+    def _back_ms(self, drone: str, dock: Dock) -> int:
+        """From a dock to the drone's own pad, where it has to come there."""
+        return self._distances.to(self.home(drone))[dock.place] if self._returns else 0
 
     def _way_ms(self, place: int, dock: Dock) -> int:
         net = self._control.net

@@ -6,7 +6,7 @@ drone rests on its own pad at the end of a flight, when a person gives it back, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from flightd.adapters.ground_link.messages.published import StatusReport
@@ -27,26 +27,31 @@ class KeptAir:
     is_believed: bool | None
     flew: bool
     at: tuple[float, float] | None
+    stand: int | None = None
 
 
 class DroneAir:
-    """`see` it often, `close` it while traffic does not fly the drone.  At first it rests on its pad."""
+    """`see` it often, `close` it while traffic does not fly the drone.  At first it rests on its pad, or on
+    that of the node that it `stands_on`."""
 
-    def __init__(self, drone: str, floor: FleetFloor) -> None:
+    def __init__(self, drone: str, floor: FleetFloor, stands_on: str | None = None) -> None:
         self._drone = drone
         self._floor = floor
-        self.place = floor.pad(drone)
+        self.stand = floor.stand(drone, stands_on)
+        """The pad on which it rested last: its own, or a shared one."""
+        self.place = self.stand
         """A vertex near the drone."""
         self.closed: frozenset[int] = frozenset()
         self.doubt_m = 0.0
         """By how much it may be beside all that."""
         self.rests = True
-        """It stands on its own pad, for certain."""
+        """It stands on its own pad, or on a shared one, for certain."""
         self.is_astray = False
-        """It is on the ground, and nothing shows that it is on its own pad."""
+        """It is on the ground, and nothing shows that it is on a pad."""
         self.is_believed: bool | None = None
         """Its session began on the ground, so that its position is none that it took for granted; None: not
         told yet."""
+        self._told_stand = self.stand
         self._session = ""
         self._armed = self._flew = False
         self._at: tuple[float, float] | None = None
@@ -63,6 +68,7 @@ class DroneAir:
             self.is_believed,
             self._flew,
             self._at,
+            self.stand,
         )
 
     def recall(self, session: str, kept: KeptAir, ways: Sequence[Sequence[str]]) -> None:
@@ -71,22 +77,27 @@ class DroneAir:
         self.place, self.closed, self.doubt_m = kept.place, kept.closed, kept.doubt_m
         self.rests, self.is_astray, self.is_believed = kept.rests, kept.is_astray, kept.is_believed
         self._flew, self._at = kept.flew, kept.at
+        self.stand = self._floor.pad(self._drone) if kept.stand is None else kept.stand
         if any(ways):
             self.rests = False
         self.close(ways, kept.doubt_m)
 
-    def see(self, status: StatusReport | None, *, stood: bool, ordered: bool) -> None:
-        """What it told last; `stood`: in this session it told where it stands; `ordered`: it is silent, and
-        may fly what it was ordered."""
+    def see(self, status: StatusReport | None, *, stands_on: str | None, ordered: bool) -> None:
+        """What it told last; `stands_on`: where it stands, where it told so in this session; `ordered`: it is
+        silent, and may fly what it was ordered."""
         if status is not None:
-            self._see_session(status, stood=stood)
+            self._told_stand = self._floor.stand(self._drone, stands_on)
+            self._see_session(status, stood=stands_on is not None)
             self._see_flight(status)
         if ordered:
             self.rests = False
 
     def _see_session(self, status: StatusReport, *, stood: bool) -> None:
         if status.session != self._session:
-            self.is_astray |= bool(self._session) and not self.rests
+            # a daemon takes it for granted that it begins on the drone's own pad
+            knows = self.rests and self.stand == self._floor.pad(self._drone)
+            self.is_astray |= bool(self._session) and not knows
+            self.rests &= not self.is_astray
             self._session, self.is_believed, self._flew = status.session, None, False
         vehicle = status.vehicle
         self._armed = vehicle.armed if vehicle is not None else status.phase not in WAITS | OVER
@@ -105,22 +116,37 @@ class DroneAir:
         elif status.phase in OVER:
             is_home = self._at is not None and self._floor.is_pad(self._drone, self._at)
             if status.phase is Phase.DONE and self.is_believed and is_home:
-                self._rest()
+                self._rest(self._floor.pad(self._drone))
             else:
                 self.is_astray = True
         elif status.phase is Phase.PREFLIGHT and not self._flew:
-            self._rest()
+            self._rest(self.stand)
+        elif status.phase is Phase.PREFLIGHT and self.is_believed and self._stands_on_shared:
+            self._rest(self._told_stand)
 
-    def close(self, ways: Sequence[Sequence[str]], doubt_m: float, *, holds: bool = False) -> None:
-        """It may be on these ways, over nodes, from where it was seen last, and on its way home.  How far
-        beside all that lessens only by what a drone tells that `holds`, and knows its place."""
+    @property
+    def _stands_on_shared(self) -> bool:
+        return self._told_stand != self._floor.pad(self._drone)
+
+    def close(
+        self,
+        ways: Sequence[Sequence[str]],
+        doubt_m: float,
+        *,
+        pads: Iterable[int] = (),
+        holds: bool = False,
+    ) -> None:
+        """It may be on these ways, over nodes, from where it was seen last, on its way home, and on its way
+        down onto shared `pads`.  How far beside all that lessens only by what a drone tells that `holds`,
+        and knows its place."""
         if self.rests:
             return
         floor = self._floor
-        here = floor.pads[self._drone].node if self._at is None else floor.nearest(self._at)
-        around = frozenset[int]() if self._at is None else floor.around(self._at)
+        stood = floor.lanes.vertices[self.stand].node
+        here = stood if self._at is None else floor.nearest(self._at)
+        around = floor.onto(self.stand) if self._at is None else floor.around(self._at)
         found = (floor.way(self._drone, (here, *way)) for way in ((), *ways))
-        self.closed = self.closed.union([self.place], around, *found)
+        self.closed = self.closed.union([self.place], around, *found, *map(floor.onto, pads))
         self.place = floor.lanes.over(here)
         is_sure = holds and self._armed and bool(self.is_believed)
         self.doubt_m = doubt_m if is_sure else max(self.doubt_m, doubt_m)
@@ -134,7 +160,7 @@ class DroneAir:
         """A person says that on the ground it stands on its pad, and in the air it is where it tells."""
         self.is_astray = False
         if not self._armed:
-            self._rest()
+            self._rest(self._told_stand)
         elif self.is_believed:
             self.begin()
 
@@ -142,6 +168,6 @@ class DroneAir:
         """Traffic flies it, from where it rests."""
         self.closed, self.doubt_m = frozenset(), 0.0
 
-    def _rest(self) -> None:
-        self.rests, self._at, self.place = True, None, self._floor.pad(self._drone)
+    def _rest(self, pad: int) -> None:
+        self.rests, self._at, self.place, self.stand = True, None, pad, pad
         self.begin()

@@ -86,7 +86,8 @@ class FleetDrone:
         self._paused, self._was_taken = drone.vehicle.is_paused, False
         self._called_off_s = -math.inf
         self._stands_since_s = 0.0
-        self.air = DroneAir(name, floor)
+        stands_on = None if drone.standing is None else drone.standing.node
+        self.air = DroneAir(name, floor, stands_on)
         self._levels = sorted({level for node in floor.nodes for level in node.levels})
         self._sides = {(rack.aisle, rack.side) for rack in floor.racks}
         self._faces = {node.id: node.aisle for node in floor.nodes if node.levels}
@@ -103,7 +104,8 @@ class FleetDrone:
         status = self.drone.status
         if status is None or not self.drone.is_heard or not self.drone.is_automatic or self._refused:
             return False
-        if self.objection or self.air.is_astray or self.air.is_believed is False:
+        is_down = self.waits and self._lands  # it flies on from there
+        if self.objection or self.air.is_astray or self.air.is_believed is False or is_down:
             return False
         return status.phase not in FLYING or status.phase is Phase.RELOCATE or self._is_on_base(status)
 
@@ -154,8 +156,18 @@ class FleetDrone:
         vehicle = None if self.drone.status is None else self.drone.status.vehicle
         if vehicle is None or vehicle.battery_frac is None or not self.waits or self._base:
             return None
-        is_low = self.pad.charges and vehicle.battery_frac < self._charged_frac
-        return self._charged_frac if is_low else None
+        charges = self.pad.charges or self.air.stand != self._floor.pad(self.name)
+        return self._charged_frac if charges and vehicle.battery_frac < self._charged_frac else None
+
+    @property
+    def _level(self) -> float:
+        """How full its battery is, for shared pads: who is charged on its own pad, or takes no other, is
+        full."""
+        status = self.drone.status
+        vehicle = None if status is None else status.vehicle
+        if status is None or vehicle is None or status.lands_at is None or self.pad.charges:
+            return 1.0
+        return 1.0 if vehicle.battery_frac is None else vehicle.battery_frac
 
     @property
     def stands(self) -> bool:
@@ -169,7 +181,7 @@ class FleetDrone:
         if status is None or self.objection or not self.drone.is_heard or not self.drone.is_automatic:
             return None
         if self.waits:
-            return self._floor.pad(self.name) if self.air.rests else None
+            return self.air.stand if self.air.rests else None
         if not self.air.is_believed or self._doubt_m(status) > 0.0:
             return None
         if status.phase is not Phase.HOLD or not self.drone.vehicle.is_idle or status.position is None:
@@ -193,7 +205,9 @@ class FleetDrone:
             charge = 0.0  # nobody sends it anywhere
         self.air.doubt_m = self._doubt_m(status)
         failed = dict(self._not_counted)
-        return DroneReport(self.name, self._done, charge, self.air.doubt_m, not_counted=failed)
+        return DroneReport(
+            self.name, self._done, charge, self.air.doubt_m, not_counted=failed, level=self._level
+        )
 
     def _doubt_m(self, status: StatusReport | None) -> float:
         if status is None or status.phase in _CLIMBS or status.phase not in _IN_AIR:
@@ -227,7 +241,8 @@ class FleetDrone:
             self.air.give_back()
         ordered = not drone.is_heard and bool(self._base or drone.vehicle.ahead)
         was_astray = self.air.is_astray
-        self.air.see(drone.status, stood=drone.standing is not None, ordered=ordered)
+        stands_on = None if drone.standing is None else drone.standing.node
+        self.air.see(drone.status, stands_on=stands_on, ordered=ordered)
         if self.air.is_astray and not was_astray:
             drone.taken_by_person()  # it lies where it is until he gives it back
         self._was_taken = drone.is_taken
@@ -267,7 +282,11 @@ class FleetDrone:
         base = [self._node_of(step) for step in self._base]
         is_held = status is not None and status.phase is Phase.HOLD and status.position is not None
         holds = self.drone.is_heard and is_held
-        self.air.close([(vehicle.last_node, *vehicle.ahead), told, base], self._doubt_m(status), holds=holds)
+        lands = {step.action.vertex for step in self._base if step.action.act is Act.LAND}
+        dock = self._floor.dock_at(None if status is None else status.lands_at)
+        pads = lands if dock is None else {*lands, dock}
+        ways = [(vehicle.last_node, *vehicle.ahead), told, base]
+        self.air.close(ways, self._doubt_m(status), pads=pads, holds=holds)
 
     @property
     def way_home(self) -> frozenset[int]:
@@ -314,7 +333,7 @@ class FleetDrone:
         self._done, self._orders, self._refused, self._refuses_since_s = 0, None, "", None
         self._not_counted.clear()
         self.air.begin()
-        self.drone.flies = self.drone.lands = False
+        self.drone.flies = self.drone.lands = self.drone.docks = False
         self.drone.has_more = True
         if self._paused:
             self._pause(paused=False)
@@ -323,7 +342,7 @@ class FleetDrone:
         """Traffic does not fly it any more: what it was ordered ends at the next node."""
         self._base.clear()
         self._orders = None
-        self.drone.flies = self.drone.lands = self.drone.has_more = False
+        self.drone.flies = self.drone.lands = self.drone.docks = self.drone.has_more = False
         if self.drone.is_automatic and now_s - self._called_off_s >= _CALLED_OFF_EVERY_S:
             self._called_off_s = now_s
             self._refused = ""
@@ -341,9 +360,15 @@ class FleetDrone:
         if paused is not self._paused:
             self._pause(paused=paused)
         self._order()
-        lands = bool(self._base) and self._base[0].action.act is Act.LAND
+        lands = self._lands
         self.drone.lands = lands and not paused
+        self.drone.docks = lands and self._base[0].action.vertex != self._floor.pad(self.name)
         self.drone.flies = self._orders is not None and not paused
+
+    @property
+    def _lands(self) -> bool:
+        """All that is left of what it was released to is to come down."""
+        return bool(self._base) and self._base[0].action.act is Act.LAND
 
     def _see_refusal(self, now_s: float) -> None:
         """In the air; on the ground it may be ready a little later."""
@@ -365,7 +390,8 @@ class FleetDrone:
         if not self._base or status is None or (status.phase in WAITS and self._orders is not None):
             return
         if self._orders is None:
-            here = self._floor.pads[self.name].node if self.waits else self.drone.vehicle.last_node
+            stand = self._floor.lanes.vertices[self.air.stand].node
+            here = stand if self.waits else self.drone.vehicle.last_node
             self._orders = BaseOrders(here)
         if not any(step.action.act is Act.TAKE_OFF for step in self._base):
             for step in self._base:

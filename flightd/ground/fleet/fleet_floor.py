@@ -17,6 +17,7 @@ import msgspec
 from flightd.adapters.ground_link.messages.floor import FloorPad, FloorStatus
 from flightd.core.errors import InputError
 from flightd.fleet.traffic.cells import CellSize
+from flightd.fleet.traffic.docks import Dock, DockKind
 from flightd.fleet.traffic.lanes import UPRIGHT, Box, Lane, LaneGraph, Vertex
 from flightd.ground.mqtt.linked_floor import node_of_pad, open_ways
 from flightd.site.ways import Ways
@@ -25,8 +26,11 @@ HEIGHT_M: Final = 1.5
 """Of all nodes; no two drones are ever apart by their heights."""
 WHOLE_AIR_M: Final = 1000.0
 _TO_PAD: Final = "pad of "
+_DOCK: Final = "dock "
 _NEAR_M: Final = 0.4
 """A drone hovers over a node that is so near."""
+_CHARGES_S: Final = 1800.0
+"""What a shared pad is taken to need to fill an empty battery."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +47,12 @@ def own_pad(drone: str, floor: FloorStatus, stands_on: str) -> OwnPad:
     """The pad of one drone, which stands beside the node `stands_on`.  InputError where it might come down on
     another one, which may be another drone's."""
     for pad in floor.pads:
-        if pad.charge and node_of_pad(floor, pad) != floor.home:
+        if pad.charge and not pad.shared and node_of_pad(floor, pad) != floor.home:
             raise InputError(
                 f"{drone} would come down on the pad {pad.id}, too, on a low battery",
-                remedy="let its site file say charge = false of every pad but its own",
+                remedy="let its site file say charge = false of every pad but its own, or shared = true",
             )
-    if stands_on != floor.home:
+    if stands_on not in {floor.home, *(node_of_pad(floor, pad) for pad in _shared(floor))}:
         raise InputError(
             f"{drone} stands on the pad at {stands_on} and comes home to that at {floor.home}",
             remedy='call its own pad "home" in its site file',
@@ -72,12 +76,26 @@ class FleetFloor:
                     f"{first} and {other} fly by different maps: {floors[first].name}, {floors[other].name}",
                     remedy="give both the same site file, but for their pads",
                 )
+            if _shared(floors[other]) != _shared(floors[first]):
+                raise InputError(
+                    f"{first} and {other} share different pads", remedy="give both the same shared pads"
+                )
+        self._shared = _shared(floors[first])
         self.map = with_all_pads([*floors.values()])
         self.nodes = floors[first].nodes
         self.racks = floors[first].racks
         self.pads = {drone: own_pad(drone, floor, stands[drone]) for drone, floor in floors.items()}
-        _check_apart(self.pads, cell)
-        self.lanes = _lanes(floors[first], self.pads)
+        docks = {
+            pad.id: OwnPad(node_of_pad(floors[first], pad), pad.x_m, pad.y_m, charges=True)
+            for pad in self._shared
+        }
+        _check_apart([*self.pads.items(), *docks.items()], cell)
+        self.lanes = _lanes(floors[first], self.pads, docks)
+        self.docks = tuple(
+            Dock(name, self.lanes.index[f"{_DOCK}{name}"], DockKind.CONTACT, _CHARGES_S) for name in docks
+        )
+        """The pads that the drones share."""
+        self._dock_at = {self.lanes.vertices[dock.place].node: dock.place for dock in self.docks}
         vertices = self.lanes.vertices
         self._lane_of = {
             frozenset((lane.a, lane.b)): number
@@ -103,6 +121,8 @@ class FleetFloor:
         empty where it is."""
         if not self.is_of(floor):
             return f"it flies by another map: {floor.name}"
+        if _shared(floor) != self._shared:
+            return "it shares other pads than before"
         try:
             pad = own_pad(drone, floor, floor.home if stands_on is None else stands_on)
         except InputError as err:
@@ -119,6 +139,19 @@ class FleetFloor:
     def pad(self, drone: str) -> int:
         """The vertex on a drone's pad."""
         return self.lanes.index[f"{_TO_PAD}{drone}"]
+
+    def dock_at(self, node: str | None) -> int | None:
+        """The vertex on the shared pad of a node; None where there is none."""
+        return self._dock_at.get(node or "")
+
+    def stand(self, drone: str, node: str | None) -> int:
+        """The vertex on which a drone stands that says so of this node: on a shared pad, else on its own."""
+        return self._dock_at.get(node or "", self.pad(drone))
+
+    def onto(self, pad: int) -> frozenset[int]:
+        """The air from over a pad down onto it."""
+        over = self.lanes.index[self.lanes.vertices[pad].node]
+        return frozenset({pad, over, self._lane_of[frozenset((pad, over))]})
 
     def is_pad(self, drone: str, at: tuple[float, float]) -> bool:
         """Whether a drone is on its pad."""
@@ -192,8 +225,12 @@ def _without_pads(floor: FloorStatus) -> FloorStatus:
     return msgspec.structs.replace(floor, home="", pads=())
 
 
-def _check_apart(pads: Mapping[str, OwnPad], cell: CellSize) -> None:
-    for (a, one), (b, two) in itertools.combinations(pads.items(), 2):
+def _shared(floor: FloorStatus) -> tuple[FloorPad, ...]:
+    return tuple(sorted((pad for pad in floor.pads if pad.shared), key=lambda pad: pad.id))
+
+
+def _check_apart(pads: Sequence[tuple[str, OwnPad]], cell: CellSize) -> None:
+    for (a, one), (b, two) in itertools.combinations(pads, 2):
         apart_m = math.dist((one.x_m, one.y_m), (two.x_m, two.y_m))
         if one.node == two.node or apart_m < cell.separation_m:
             raise InputError(
@@ -202,7 +239,7 @@ def _check_apart(pads: Mapping[str, OwnPad], cell: CellSize) -> None:
             )
 
 
-def _lanes(floor: FloorStatus, pads: Mapping[str, OwnPad]) -> LaneGraph:
+def _lanes(floor: FloorStatus, pads: Mapping[str, OwnPad], docks: Mapping[str, OwnPad]) -> LaneGraph:
     vertices = [Vertex(node.id, node.id, node.x_m, node.y_m, HEIGHT_M) for node in floor.nodes]
     index = {vertex.name: number for number, vertex in enumerate(vertices)}
     ways = open_ways(floor)
@@ -211,11 +248,13 @@ def _lanes(floor: FloorStatus, pads: Mapping[str, OwnPad]) -> LaneGraph:
         both = (b, a) in ways
         if not both or a < b:
             lanes.append(_level(vertices, index[a], index[b], one_way=not both))
-    for drone, pad in pads.items():
+    own = ((f"{_TO_PAD}{drone}", drone, pad) for drone, pad in pads.items())
+    shared = ((f"{_DOCK}{dock}", dock, pad) for dock, pad in docks.items())
+    for name, of, pad in (*own, *shared):
         over = vertices[index[pad.node]]
         beside_m = math.dist((over.x_m, over.y_m), (pad.x_m, pad.y_m))
         lanes.append(Lane(index[pad.node], len(vertices), HEIGHT_M + beside_m, UPRIGHT))
-        vertices.append(Vertex(f"{_TO_PAD}{drone}", pad.node, pad.x_m, pad.y_m, 0.0, drone))
+        vertices.append(Vertex(name, pad.node, pad.x_m, pad.y_m, 0.0, of))
     return LaneGraph(vertices, lanes)
 
 

@@ -38,6 +38,8 @@ TRAFFIC: Final = Identity("fleet traffic", Role.OPERATOR, "local")
 _LOG = logging.getLogger(__name__)
 _STEP_S: Final = 0.25
 _AGAIN_S: Final = 5.0
+_CHARGED_FRAC: Final = 0.8
+"""Up to which batteries are filled on shared pads, where nothing else is said."""
 _FAILS_AGAIN_S: Final = 60.0
 """If traffic fails so soon after it failed before, it does so over the work that waits."""
 
@@ -212,9 +214,12 @@ class OwnFleet(VehicleSides):
 
     def _drones_on(self, floor: FleetFloor) -> dict[str, FleetDrone]:
         return {
-            name: FleetDrone(name, drone, floor, self._cell.uncertainty_m, self._charged_frac)
+            name: FleetDrone(name, drone, floor, self._cell.uncertainty_m, self._charged_on(floor))
             for name, drone in self._drones.items()
         }
+
+    def _charged_on(self, floor: FleetFloor) -> float:
+        return self._charged_frac or (_CHARGED_FRAC if floor.docks else 0.0)
 
     async def _keep_in_mind(self, drones: Mapping[str, KeptDrone], queue: WorkQueue) -> None:
         # as it is now: more may be asked for while it is written down beside the loop
@@ -237,7 +242,15 @@ class OwnFleet(VehicleSides):
         self._traffic, self._fleet = None, (floor, drones, pace)
         closed = self._closures
         made = partial(
-            StationTraffic, floor, drones, pace, self._cell, self._queue, self._keep_in_mind, closed
+            StationTraffic,
+            floor,
+            drones,
+            pace,
+            self._cell,
+            self._queue,
+            self._keep_in_mind,
+            closed,
+            self._charged_on(floor),
         )
         self._traffic, self._trouble = await self._aside(made), ""
 
@@ -338,7 +351,8 @@ class OwnFleet(VehicleSides):
         }
         closed = self._closures.document(told.get("inside", {}))
         flies = {"flies": self._traffic is not None, "trouble": self._trouble}
-        return {**flies, "drones": told.get("drones", {}), **work, "closed": closed}
+        docks = told.get("docks", [])
+        return {**flies, "drones": told.get("drones", {}), **work, "closed": closed, "docks": docks}
 
 
 async def stop_all(hub: Hub) -> dict[str, FlightdError | None]:

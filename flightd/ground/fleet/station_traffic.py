@@ -6,6 +6,7 @@ flown by somebody else: the air of its way is closed until it rests where traffi
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -27,6 +28,7 @@ from flightd.ground.fleet.traffic_view import TrafficView
 from flightd.ground.mqtt.safe_return import Standing
 from flightd.mission.plan.leg_times import Pace
 
+_LOG = logging.getLogger(__name__)
 _LEAST_S: Final = 60.0
 """A drone with less time left in the air is given nothing."""
 _ENDURANCE: Final = Endurance(FLIGHT_S, FLIGHT_S, RESERVE, RESERVE + _LEAST_S / FLIGHT_S)
@@ -99,7 +101,9 @@ class StationTraffic:
         queue: WorkQueue,
         keep: Keep,
         closures: Closures,
+        charged_frac: float = 0.0,
     ) -> None:
+        """On the pads that the drones share batteries are filled up to `charged_frac`."""
         self._closures = closures
         self._closed: Sequence[Closure] = ()
         self._keep = keep
@@ -110,7 +114,16 @@ class StationTraffic:
         queue.hand_back([*queue.given])
         gone = [node for node in queue.open if node not in floor.lanes.column_of]
         queue.hand_back(gone, "the drones' map has it no more")
-        self._dispatcher = Dispatcher(self._control, self._queue, _ENDURANCE, shares=True)
+        self._dispatcher = Dispatcher(
+            self._control,
+            self._queue,
+            _ENDURANCE,
+            shares=True,
+            docks=floor.docks,
+            full_at=charged_frac,
+            keep_home=True,
+        )
+        self._docks_told = 0
         self._dwell_ms = int(pace.dwell_s * 1000)
         self._flown: set[str] = set()
         self._called_back: set[str] = set()
@@ -120,8 +133,9 @@ class StationTraffic:
         self._view = TrafficView(self._control, drones)
         self._told: dict[str, Any] = {}
         self._now_ms = self._read_ms = 0
-        for name in drones:
-            self._control.enter(name, floor.pad(name))
+        for name, drone in drones.items():
+            pad = floor.pad(name)
+            self._control.enter(name, drone.air.stand if drone.air.rests else pad, ends=(pad,))
 
     @property
     def is_outdated(self) -> bool:
@@ -246,6 +260,7 @@ class StationTraffic:
         told = [report for report in reports if report is not None]
         commands = self._dispatcher.step(now_ms, told)
         self._view.see(now_ms)
+        self._tell_of_docks()
         doubting = {report.drone for report in told if report.doubt_m > 0.0}
         # who looks for his place stands by himself
         return _Decided(commands.base, commands.paused - doubting, clear, frozenset(back))
@@ -261,6 +276,12 @@ class StationTraffic:
         if name in self._flown and (seen.report is None or drone.is_ours):
             drone.fly(decided.base.get(name, ()), now_s, paused=name in decided.paused)
 
+    def _tell_of_docks(self) -> None:
+        docks = self._dispatcher.docks
+        new, self._docks_told = docks.told_count - self._docks_told, docks.told_count
+        for line in [*docks.told][len(docks.told) - new :]:
+            _LOG.warning("%s", line)
+
     def document(self) -> dict[str, Any]:
         """As JSON has it; while a step is decided, as it was before."""
         self._read_ms = self._now_ms
@@ -271,6 +292,7 @@ class StationTraffic:
             "drones": self._view.drones(self.flown, in_full=in_full),
             "inside": self._control.inside(),
             "held_back": self._dispatcher.held_back(),
+            "docks": self._view.docks(self._dispatcher.docks),
         }
 
     @property

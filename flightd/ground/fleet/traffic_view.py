@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from flightd.fleet.traffic.dock_queue import DockQueue
 from flightd.fleet.traffic.drone_course import DroneCourse
 from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action
@@ -60,6 +61,20 @@ class TrafficView:
             }
             for name, course in self._control.drones.items()
         }
+
+    def docks(self, docks: DockQueue) -> list[dict[str, Any]]:
+        """The pads that the drones share, as JSON has them: for which `drone` each is kept (empty: it is
+        free), and whether it is `taken`, or that one is still to come."""
+        places = {name: course.place for name, course in self._control.drones.items()}
+        return [
+            {
+                "pad": dock.name,
+                "node": self._node(dock.place),
+                "drone": docks.holders.get(dock.name, ""),
+                "taken": places.get(docks.holders.get(dock.name, "")) == dock.place,
+            }
+            for dock in docks.docks
+        ]
 
     def _now(self, name: str, course: DroneCourse, *, is_flown: bool) -> dict[str, Any]:
         drone = self._drones[name]

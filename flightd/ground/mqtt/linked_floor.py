@@ -35,7 +35,8 @@ class WaysHome:
 
     def __init__(self, floor: FloorStatus) -> None:
         self._at = {node.id: (node.x_m, node.y_m) for node in floor.nodes}
-        landed = [node_of_pad(floor, pad) for pad in floor.pads if pad.charge]
+        landed = [node_of_pad(floor, pad) for pad in floor.pads if pad.charge and not pad.shared]
+        landed = landed or [floor.home]
         back = [(b, a, self._apart_m(a, b)) for a, b in open_ways(floor)]
         ways = Ways([_PADS, *self._at], [*((_PADS, node, 0.0) for node in landed), *back])
         self._home_m = {_PADS: 0.0}

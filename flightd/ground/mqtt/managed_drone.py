@@ -101,7 +101,7 @@ class ManagedDrone:
         """Somebody may hear what is said."""
         self.on_taken: Callable[[bool], None] = lambda _taken: None
         self.on_decided: Callable[[Decided], None] = lambda _decided: None
-        self.flies = self.lands = False
+        self.flies = self.lands = self.docks = False
         """As `Wish`: whoever gives the orders sets them."""
         self.has_more = False
         """A drone that holds without an order waits for one that will come."""
@@ -115,7 +115,8 @@ class ManagedDrone:
         self._status: StatusReport | None = None
         self._is_new = True
         """It was started anew: what was ordered before is over."""
-        self._heard = False
+        self._heard = self._waited = False
+        """The station hears it; it stood before a flight, by its last status."""
         self._asked: deque[Input] = deque(maxlen=_MOST_WAITING)
         self.dropped = 0
         """Messages that came faster than they were taken."""
@@ -222,7 +223,7 @@ class ManagedDrone:
         self.vehicle.change_floor(floor_of_link(welcome["floor"]))
         self._ways = WaysHome(welcome["floor"])
         self._status = self._standing = self._event_seq = None
-        self._is_new, self.is_automatic = True, False
+        self._is_new, self.is_automatic, self._waited = True, False, False
         self._asked_at_s = -_ASK_AGAIN_S
         self._return = SafeReturn()
         self._sent.clear()
@@ -284,6 +285,9 @@ class ManagedDrone:
 
     def _step(self, status: StatusReport, now_s: float, tasks: asyncio.TaskGroup) -> None:
         assert self._welcome is not None
+        before, self._waited = self._waited, status.phase is Phase.PREFLIGHT
+        if self._waited and not before:  # maybe on another pad than it stood on
+            self._standing, self._return = None, SafeReturn()
         arrived = self._arrived(status)
         asked = [self._asked.popleft() for _ in range(len(self._asked))]
         stands_on = None if self._standing is None else self._standing.node
@@ -318,7 +322,8 @@ class ManagedDrone:
 
     @property
     def _wish(self) -> Wish:
-        return Wish(tuple(self._ahead), self.vehicle.last_node, self._counts.go_on, self.flies, self.lands)
+        ahead, last = tuple(self._ahead), self.vehicle.last_node
+        return Wish(ahead, last, self._counts.go_on, self.flies, self.lands, self.docks)
 
     def _take_output(self, one: Output, status: StatusReport) -> None:
         match one:
@@ -443,7 +448,9 @@ class ManagedDrone:
                 self._planned, self._counts.levels = (act_id, act.nodes), levels
             else:
                 plan = self._planned[0] if act.kind is CommandKind.START and self._planned else ""
-                order = Act(act_id, act.kind, act.node, plan, status.session, status.stamp_ns, act.waits)
+                order = Act(
+                    act_id, act.kind, act.node, plan, status.session, status.stamp_ns, act.waits, act.lands
+                )
                 await link.act(order, by_person=False)
             self._trouble = self._trouble if act == self._did[0] else None
         except FlightdError as err:

@@ -29,13 +29,15 @@ WAITS = frozenset({Phase.PREFLIGHT, Phase.ARMING})
 class Wish:
     """What an order wants by now: the nodes to be flown along, none to stay; the node that the drone is at or
     left last; whether something goes on there that a pause would interrupt; whether it is to be in the air,
-    if only over its pad's node; whether it may come down there."""
+    if only over its pad's node; whether it may come down there, and if on that node's pad rather than at
+    home."""
 
     ahead: tuple[str, ...]
     last: str
     works: bool = False
     flies: bool = False
     lands: bool = False
+    docks: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +49,12 @@ class PlanNext:
 
 @dataclass(frozen=True, slots=True)
 class CommandNext:
-    """Give a command; `node` only with goto, and so is whether the drone `waits` there."""
+    """Give a command; `node` only with goto, and so is whether the drone `waits` there, or `lands`."""
 
     kind: CommandKind
     node: str = ""
     waits: bool = False
+    lands: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +97,9 @@ def _on_ground(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, 
 def _in_air(status: StatusReport, wish: Wish) -> Next:
     at_end = _is_at_end(status)
     goal, following = status.way[0], "" if at_end else _following(status)
-    if wish.lands and not wish.ahead and {*status.way} == {wish.last}:
-        if status.waits_at:
-            return CommandNext(CommandKind.GOTO, wish.last)  # home from there: onto its pad
-        return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD else None
+    comes_down = goal == wish.last if wish.docks else {*status.way} == {wish.last}
+    if wish.lands and not wish.ahead and comes_down:
+        return _down(status, wish)
     if goal == wish.last:
         wanted = wish.ahead[0] if wish.ahead else goal
     elif goal in wish.ahead:
@@ -111,6 +113,13 @@ def _in_air(status: StatusReport, wish: Wish) -> Next:
     if wish.ahead or wish.works:
         return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD and not waits else None
     return CommandNext(CommandKind.PAUSE) if status.phase in AT_NODE and not ends else None
+
+
+def _down(status: StatusReport, wish: Wish) -> Next:
+    """Onto the pad of the node that it is at: home from there, where that is its own."""
+    if status.waits_at or (wish.docks and status.lands_at != wish.last):
+        return CommandNext(CommandKind.GOTO, wish.last, lands=wish.docks)
+    return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD else None
 
 
 def _following(status: StatusReport) -> str:

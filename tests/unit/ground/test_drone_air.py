@@ -36,7 +36,7 @@ def seen(*statuses: StatusReport) -> DroneAir:
     """First on the ground, then this."""
     air = DroneAir("b", FLOOR)
     for status in (GROUND, *statuses):
-        air.see(status, stood=status.session == GROUND.session, ordered=False)
+        air.see(status, stands_on="B1" if status.session == GROUND.session else None, ordered=False)
         air.close([], 0.0)
     return air
 
@@ -72,10 +72,10 @@ def test_air_grows_from_where_it_was_seen_last_and_over_all_that_it_was_released
     lane = FLOOR.around((0.8 + FLOOR.lanes.vertices[B2].x_m, FLOOR.lanes.vertices[B2].y_m))
     assert lane
     assert lane <= air.closed, "the lane in hand"
-    air.see(told(Phase.FOLLOW), stood=True, ordered=True)
+    air.see(told(Phase.FOLLOW), stands_on="B1", ordered=True)
     air.close([["A3"]], 3.0)
     assert {A3, B2, PAD} | lane <= air.closed
-    air.see(told(Phase.FOLLOW, "B1"), stood=True, ordered=False)
+    air.see(told(Phase.FOLLOW, "B1"), stands_on="B1", ordered=False)
     air.close([], 0.0)
     assert (A3 in air.closed, air.doubt_m) == (True, 3.0), "until it rests"
     air.give_back()
@@ -94,11 +94,11 @@ def test_who_holds_and_knows_his_place_again_is_beside_his_air_no_more() -> None
     closed = air.closed
     air.close([], 3.0, holds=False)
     assert air.doubt_m == 3.0
-    air.see(told(Phase.HOLD, "B2"), stood=True, ordered=False)
+    air.see(told(Phase.HOLD, "B2"), stands_on="B1", ordered=False)
     air.close([], 0.0, holds=True)
     assert (air.doubt_m, closed <= air.closed) == (0.0, True)
     air.close([], 3.0)
-    air.see(told(Phase.HOLD, "B2", session="b 2"), stood=False, ordered=False)
+    air.see(told(Phase.HOLD, "B2", session="b 2"), stands_on=None, ordered=False)
     air.close([], 0.0, holds=True)
     assert air.doubt_m == 3.0, "it began in flight"
 
@@ -112,13 +112,13 @@ def test_a_position_of_a_session_that_began_in_the_air_is_not_believed() -> None
 
 def test_who_is_silent_with_an_order_may_have_flown() -> None:
     air = seen()
-    air.see(GROUND, stood=True, ordered=True)
+    air.see(GROUND, stands_on="B1", ordered=True)
     air.close([["B3"]], 0.0)
     assert B3 in air.closed
-    air.see(told(Phase.PREFLIGHT, armed=False, session="b 2"), stood=False, ordered=False)
+    air.see(told(Phase.PREFLIGHT, armed=False, session="b 2"), stands_on=None, ordered=False)
     assert air.is_astray
 
     air = seen()
-    air.see(GROUND, stood=True, ordered=True)
-    air.see(GROUND, stood=True, ordered=False)
+    air.see(GROUND, stands_on="B1", ordered=True)
+    air.see(GROUND, stands_on="B1", ordered=False)
     assert air.rests, "in the same session, never armed"
