@@ -108,7 +108,10 @@ async def flown(
 
 
 @contextlib.contextmanager
-def waiting(names: Sequence[str], config: Config = CONFIG) -> Iterator[dict[str, LiveFlight]]:
-    """The drones, on their pads."""
+def waiting(
+    names: Sequence[str], config: Config = CONFIG, docks: Sequence[str] = ()
+) -> Iterator[dict[str, LiveFlight]]:
+    """The drones, on their pads; those at the nodes `docks` they share."""
     with contextlib.ExitStack() as stack:
-        yield {name: stack.enter_context(LiveFlight(hall(name), config, speed=1.0)) for name in names}
+        sites = {name: hall(name, docks=docks) for name in names}
+        yield {name: stack.enter_context(LiveFlight(site, config, speed=1.0)) for name, site in sites.items()}

@@ -4,7 +4,9 @@ links."""
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +14,7 @@ from flightd.adapters.ground_link.client import Address
 from flightd.core.types import Phase
 from flightd.ground.access.audit import newest_entries
 from tests.rigs.event_loops import in_real_time, real
+from tests.rigs.paper_drones import hall
 from tests.rigs.waiting import until
 from tests.web.live_flight import LiveFlight
 from tests.web.own_fleet_rig import flown, waiting
@@ -51,6 +54,42 @@ def test_a_drone_visits_its_nodes_round_one_that_a_person_took_and_one_that_fell
         real(go(flights))
     flown_by = {drone for what, drone, outcome, _ in written if (what, outcome) == ("start", "accepted")}
     assert flown_by == {"a", "b", "c"}
+
+
+@pytest.mark.realtime(cores=0.8)
+def test_two_low_drones_share_a_charge_pad_and_one_flies_on_from_there() -> None:
+    async def go(flights: dict[str, LiveFlight]) -> None:
+        a, b = (flights[name] for name in "ab")
+        a.faults.battery, b.faults.battery = 0.6, 0.9
+        async with flown(flights, _SPEED, []) as fleet:
+
+            def has(drone: str, *, taken: bool) -> Callable[[list[dict[str, Any]]], bool]:
+                dock = {"pad": "dock-A5", "node": "A5", "drone": drone, "taken": taken}
+                return lambda told: told == [dock]
+
+            await fleet.until_told("docks", has("", taken=False))
+            assert (await fleet.ask("POST", "/api/fleet/tour", {"nodes": ["A4"], "drone": "a"}))[0] == 200
+            await fleet.until_told("docks", has("a", taken=False))
+            assert (await fleet.ask("POST", "/api/fleet/tour", {"nodes": ["B3"], "drone": "b"}))[0] == 200
+            await until(lambda: b.phase is Phase.FOLLOW, 60)
+            b.faults.battery = 0.6
+            await fleet.until_told("docks", has("a", taken=True))
+            await until(lambda: a.phase is Phase.PREFLIGHT, 60)
+            x_m, y_m, z_m = a.at_m
+            dock = hall("a").nodes["A5"]
+            assert (x_m, y_m) == pytest.approx((dock.x_m, dock.y_m), abs=0.25)
+            assert z_m < 0.2
+            await until(lambda: b.phase is Phase.DONE, 120)
+            assert b.at_m[0] == pytest.approx(0.0, abs=0.25), "on its own pad, for the other one is taken"
+            a.faults.battery = 0.9
+            assert (await fleet.ask("POST", "/api/fleet/tour", {"nodes": ["A3"]}))[0] == 200
+            await fleet.until_told("done", lambda done: "A3" in done)
+            await until(lambda: a.phase is Phase.DONE, 120)
+            await fleet.until_told("docks", has("", taken=False))
+            assert fleet.judge.faults == []
+
+    with waiting("ab", docks=["A5"]) as flights:
+        real(go(flights))
 
 
 @pytest.mark.realtime(cores=0.5)
