@@ -44,7 +44,9 @@ def test_who_is_low_after_its_tour_charges_on_the_shared_pad_and_flies_again_fro
         a.battery_frac = 0.85
         await until(lambda: "A4" in fleet.state["done"], 100)
         await until(lambda: a.phase is Phase.DONE, 100)
-        assert (a.stand, holder(fleet)) == ("A5", ("", False)), "down on its own pad, and the other one is free"
+        assert (a.stand, holder(fleet)) == ("A5", ("", False)), (
+            "down on its own pad, and the other one is free"
+        )
 
     fly(go, "ab", docks=DOCKS)
 

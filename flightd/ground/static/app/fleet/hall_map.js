@@ -116,15 +116,21 @@ function Pads({ drones, told, marks }) {
   return html`
     <ul class="pads" aria-label=${say("Pads")}>
       ${pads.map(
-        ({ node, owner, isThere, charges }) => html`
-          <li key=${node} class=${isThere ? "pad-taken" : ""}>
+        ({ node, owner = "", isThere, charges, shared }) => html`
+          <li key=${node} class=${isThere || shared?.taken ? "pad-taken" : ""}>
             ${owner && html`<${Badge} mark=${marks.get(owner)} />`}
-            <span><strong>${say("Pad {node}:", { node })}</strong> ${padWords(owner, isThere)}${charges && `, ${say("charges")}`}</span>
+            <span><strong>${say("Pad {node}:", { node })}</strong> ${shared ? sharedWords(shared) : padWords(owner, isThere)}${charges && `, ${say("charges")}`}</span>
           </li>
         `,
       )}
     </ul>
   `;
+}
+
+function sharedWords({ drone, taken }) {
+  if (drone === undefined) return say("shared");
+  if (!drone) return say("shared, free");
+  return taken ? say("{name} stands here", { name: drone }) : say("kept for {name}", { name: drone });
 }
 
 function padWords(owner, isThere) {

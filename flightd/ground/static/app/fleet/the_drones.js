@@ -43,16 +43,16 @@ export function placeOf({ known, floor }, told) {
   const { status, track } = known;
   const old = isSilent(known);
   if (status?.position) return { ...status.position, how: old ? "lost" : "flies" };
-  const pad = padOf(floor);
+  const pad = padOf(floor, told?.rests ? told.at : floor.home);
   const isThere = pad && stands(status, told);
   const [x_m, y_m] = (!isThere && track.at(-1)) || (pad ? [pad.x_m, pad.y_m] : []);
   return x_m === undefined ? null : { x_m, y_m, yaw_rad: null, how: isThere && !old ? "stands" : "lost" };
 }
 
-// It is on its own pad: for the station's traffic only where that is certain.
+// It is on a pad: for the station's traffic only where that is certain.
 export const stands = (status, told) => (told ? told.rests : Boolean(status) && isGrounded(status) && status.phase !== "pilot" && status.phase !== "aborted");
 
-const padOf = (floor) => floor.pads.find((_, i) => nodesOf(floor)[i] === floor.home);
+const padOf = (floor, at) => floor.pads.find((_, i) => nodesOf(floor)[i] === at);
 
 // The nodes of a floor's pads, found once.
 const padNodes = new WeakMap();
@@ -72,7 +72,9 @@ export function padsOf(drones, told) {
   for (const { name, known: { status }, floor } of drones) {
     for (const [i, pad] of floor.pads.entries()) {
       const node = nodesOf(floor)[i];
-      if (node === floor.home) pads.set(node, { node, owner: name, isThere: stands(status, told?.drones?.[name]), charges: pad.charge });
+      const it = told?.drones?.[name];
+      if (node === floor.home) pads.set(node, { node, owner: name, isThere: stands(status, it) && (it?.at ?? node) === node, charges: pad.charge });
+      else if (pad.shared) pads.set(node, { node, shared: told?.docks?.find((dock) => dock.node === node) ?? {}, charges: pad.charge });
       else if (!pads.has(node)) pads.set(node, { node, owner: "" });
     }
   }
