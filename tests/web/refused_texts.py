@@ -64,6 +64,7 @@ NO_PAGE = {
     "ground/guide_pages/rendering.py": "markup of the guide, which is English",
     "ground/mqtt": "options of the command line, and the broker's own connection",
     "ground/server.py": "options of the command line",
+    "ground/station_lock.py": "of the station's start",
     "ground/tls.py": "options of the command line",
     "ground/wms_exchange": "of the command line, and of the notes beside files that were dropped",
     "mission/machine.py": "errors of ours",

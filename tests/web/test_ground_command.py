@@ -107,6 +107,31 @@ def test_it_serves_until_ctrl_c_and_ends_in_order() -> None:
         assert process.stderr.read() == "flightd: the ground station was ended by SIGINT\n"
 
 
+def test_a_second_station_on_its_state_refuses_to_start_until_the_first_has_died(
+    flightd: Command, tmp_path: Path
+) -> None:
+    words = ("--listen", "127.0.0.1:0")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "flightd", "ground", *words], cwd=ROOT, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stderr is not None
+    with process.stderr:
+        assert "the ground station is at" in process.stderr.readline()
+        code, out, error = flightd("ground", *words)
+        assert (code, out, error.count("\n")) == (2, "", 1)
+        assert f"--state {tmp_path / 'state'}: another station uses it (process {process.pid})" in error
+        process.kill()
+        process.wait(20)
+    again = subprocess.Popen(
+        [sys.executable, "-m", "flightd", "ground", *words], cwd=ROOT, stderr=subprocess.PIPE, text=True
+    )
+    assert again.stderr is not None
+    with again.stderr:
+        assert "the ground station is at" in again.stderr.readline()
+        again.kill()
+        again.wait(20)
+
+
 def test_killed_in_flight_it_is_a_lost_ground_and_nothing_else() -> None:
     config = load_config(ROOT / "configs" / "sim.toml").with_values(
         mission={"autostart": False, "start_countdown_s": 0.0}, ground={"lost_action": "land", "lost_s": 2.0}

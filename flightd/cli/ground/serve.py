@@ -192,6 +192,7 @@ def ground(
 
         raise missing_extra("ground", "flightd ground") from None
     from flightd.ground.drone_names import drone_addresses
+    from flightd.ground.station_lock import only_station
     from flightd.ground.tls import read_certificate
 
     if mqtt_orders and mqtt is None:
@@ -221,6 +222,7 @@ def ground(
     where = replace(Listening.read(listen), secure=certificate is not None)
     access = Access(state_folder(state), login or where.is_beyond, where.secure)
     with contextlib.ExitStack() as stack:
+        stack.enter_context(only_station(state_folder(state)))
         viewer = None
         if foxglove is not None:
             viewer = stack.enter_context(_foxglove_server(foxglove, access.login, drones))
