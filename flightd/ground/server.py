@@ -262,7 +262,7 @@ async def serve(
         ]
         if folder is not None:
             book, missions = ScheduleBook(folder), MissionBook(folder)
-            shift = NightShift(book, missions, store, hub.drones, access, managers, clock)
+            shift = NightShift(book, missions, store, hub.drones, access, managers, clock, own_fleet)
             tasks.create_task(shift.run(), name="schedules")
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")

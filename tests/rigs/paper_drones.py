@@ -43,7 +43,9 @@ _COUNTS_S = 6.0
 _LASTS_S = {Phase.TAKE_OFF: 3.0, Phase.HOVER: 1.0, Phase.LAND: 3.0, Phase.RECOVER: 3.0}
 
 
-def hall(drone: str, name: str = "hall", pad: str = "", docks: Sequence[str] = ()) -> Site:
+def hall(
+    drone: str, name: str = "hall", pad: str = "", docks: Sequence[str] = (), *, unattended: bool = False
+) -> Site:
     """Two aisles of three nodes between the spurs at their ends, as this drone knows it; its own `pad` may be
     at another node.  Where there are `docks`, at these nodes, batteries are charged there alone."""
     at = PADS | ({drone: pad} if pad else {})
@@ -58,7 +60,8 @@ def hall(drone: str, name: str = "hall", pad: str = "", docks: Sequence[str] = (
         for aisle, y_m in (("A", 0.0), ("B", 3.0))
     ]
     racks = [Rack(("A", "B"), 1.6, (0.3, 1.5), positions=1)]
-    return lay_out(name, aisles, [("A2", "B2"), ("A4", "B4")], pads, ceiling_m=6.0, racks=racks)
+    crosses = [("A2", "B2"), ("A4", "B4")]
+    return lay_out(name, aisles, crosses, pads, ceiling_m=6.0, racks=racks, unattended_start=unattended)
 
 
 class PaperDrone:
@@ -71,6 +74,8 @@ class PaperDrone:
         self.on_person: Callable[[], None] = lambda: None
         self.heard = self.sees = True
         self.counts = self.never_starts = False
+        self.obstacles: tuple[str, ...] = ()
+        """What keeps it on the ground."""
         self.battery_frac = 0.9
         self.knows_docks = True
         self.charges_per_s = 0.0
@@ -268,7 +273,7 @@ class PaperDrone:
     @property
     def _possible(self) -> tuple[CommandKind, ...]:
         if self.phase is Phase.PREFLIGHT:
-            return CommandKind.PLAN, CommandKind.START
+            return (CommandKind.PLAN,) if self.obstacles else (CommandKind.PLAN, CommandKind.START)
         if self.phase is Phase.LAND:
             return (CommandKind.LAND, CommandKind.STOP)
         back = not self.plan
@@ -292,5 +297,6 @@ class PaperDrone:
             nodes_planned=0, height_m=self.truth.z_m, position=at, lines=(), lines_age_s=0.0, vehicle=vehicle,
             frames=0, frames_dropped=0, fps=30.0, latency_ms={}, link=LinkReport(0, 0, 0, 0, 0),
             way=tuple(self.way), possible=self._possible, plan=self.plan, battery_left_s=self.left_s,
-            waits_at=self.waits_at, lands_at=self._end if self.knows_docks else None,
+            obstacles=self.obstacles, waits_at=self.waits_at,
+            lands_at=self._end if self.knows_docks else None,
         )  # fmt: skip

@@ -142,9 +142,10 @@ def fly(
     memory: FleetMemory | None = None,
     charged_frac: float = 0.0,
     docks: Sequence[str] = (),
+    unattended: bool = False,
 ) -> PaperFleet:
     """Do `go` while the fleet flies."""
-    sites = {name: hall(name, docks=docks) for name in names}
+    sites = {name: hall(name, docks=docks, unattended=unattended) for name in names}
     fleet = PaperFleet(sites, memory=memory, charged_frac=charged_frac)
     for drone in fleet.drones.values():
         drone.counts = counts

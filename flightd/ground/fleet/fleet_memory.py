@@ -61,11 +61,12 @@ class KeptFloor:
 
 @dataclass(frozen=True, slots=True)
 class KeptFleet:
-    """The drones and the work; `utc_s` is when."""
+    """The drones and the work; `utc_s` is when.  `runs` of schedules gave it some of that."""
 
     drones: Mapping[str, KeptDrone]
     work: KeptWork
     utc_s: float = 0.0
+    runs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,14 +106,17 @@ class FleetMemory:
             kept.execute("DELETE FROM kept WHERE name IN ('floor', 'fleet')")
             _put(kept, "floor", replace(floor, version=__version__))
 
-    def keep(self, drones: Mapping[str, KeptDrone], work: KeptWork, *, waits: bool) -> None:
+    def keep(
+        self, drones: Mapping[str, KeptDrone], work: KeptWork, *, waits: bool, runs: tuple[str, ...] = ()
+    ) -> None:
         """Write down how they are, where that changes what the next station has to know; while work `waits`,
         every minute."""
         utc_s = self._utc_s()
-        newest = {name: _of_note(drone) for name, drone in drones.items()}, work, waits and utc_s // _TELLS_S
+        of_note = {name: _of_note(drone) for name, drone in drones.items()}
+        newest = of_note, work, waits and utc_s // _TELLS_S, runs
         if newest != self._newest:
             with self._database.changed() as kept:
-                _put(kept, "fleet", KeptFleet(drones, work, utc_s))
+                _put(kept, "fleet", KeptFleet(drones, work, utc_s, runs))
             self._newest = newest
 
     def keep_closures(self, closed: tuple[KeptClosure, ...]) -> None:

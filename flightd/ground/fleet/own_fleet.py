@@ -38,6 +38,7 @@ TRAFFIC: Final = Identity("fleet traffic", Role.OPERATOR, "local")
 _LOG = logging.getLogger(__name__)
 _STEP_S: Final = 0.25
 _AGAIN_S: Final = 5.0
+_MOST_RUNS: Final = 1000
 _CHARGED_FRAC: Final = 0.8
 """Up to which batteries are filled on shared pads, where nothing else is said."""
 _FAILS_AGAIN_S: Final = 60.0
@@ -72,6 +73,9 @@ class OwnFleet(VehicleSides):
         self._fleet: tuple[FleetFloor, Mapping[str, FleetDrone], Pace] | None = None
         self._traffic: StationTraffic | None = None
         self._queue = WorkQueue(())
+        self._runs: tuple[str, ...] = ()
+        """Of schedules, whose work it was given."""
+        self._kept_runs: frozenset[str] = frozenset()
         self._failed_s = -math.inf
         self._compared: dict[str, FloorStatus] = {}
         """The maps by which it was last tried to fly them."""
@@ -204,6 +208,7 @@ class OwnFleet(VehicleSides):
             drone.recall(fleet.drones[name])
             drone.may_start = floor.floors[name].unattended_start
         self._compared, self._queue = dict(floor.floors), WorkQueue.of(fleet.work)
+        self._runs, self._kept_runs = fleet.runs, frozenset(fleet.runs)
         await self._begin(made, drones, pace_of(floor.standings.values()))
 
     async def _made(self, floors: Mapping[str, FloorStatus], stands: Mapping[str, str]) -> FleetFloor:
@@ -223,13 +228,15 @@ class OwnFleet(VehicleSides):
 
     async def _keep_in_mind(self, drones: Mapping[str, KeptDrone], queue: WorkQueue) -> None:
         # as it is now: more may be asked for while it is written down beside the loop
-        work, waits = queue.kept(), bool(queue.open or queue.given)
-        await self._write(lambda memory: memory.keep(drones, work, waits=waits))
+        work, waits, runs = queue.kept(), bool(queue.open or queue.given), self._runs
+        if await self._write(lambda memory: memory.keep(drones, work, waits=waits, runs=runs)):
+            self._kept_runs = frozenset(runs)
 
-    async def _write(self, what: Callable[[FleetMemory], None]) -> None:
-        """Flights go on where the disk refuses: what is lost then is lost with the station alone."""
+    async def _write(self, what: Callable[[FleetMemory], None]) -> bool:
+        """Whether it was written, as far as anything is.  Flights go on where the disk refuses: what is lost
+        then is lost with the station alone."""
         if self._memory is None:
-            return
+            return True
         try:
             await self._aside(partial(what, self._memory))
             self._forgets = False
@@ -237,6 +244,7 @@ class OwnFleet(VehicleSides):
             if not self._forgets:
                 _LOG.warning("the fleet's flights are not written down: %s", err)
             self._forgets = True
+        return not self._forgets
 
     async def _begin(self, floor: FleetFloor, drones: Mapping[str, FleetDrone], pace: Pace) -> None:
         self._traffic, self._fleet = None, (floor, drones, pace)
@@ -298,6 +306,35 @@ class OwnFleet(VehicleSides):
         """Have the most valuable visited: so many `nodes`, or all of so many `aisles`, or everything; which.
         UnavailableError where the fleet does not fly yet."""
         return self._asked_traffic().ask_by_value(worth, nodes, aisles)
+
+    # what schedules ask of it
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Of its drones."""
+        return frozenset(self._drones)
+
+    @property
+    def map(self) -> FloorStatus:
+        """By which they fly.  UnavailableError where none told it yet."""
+        return self._floor
+
+    @property
+    def trouble(self) -> str:
+        """Why it does not fly; empty where it does."""
+        return "" if self._traffic is not None else self._trouble or "its drones were not heard yet"
+
+    def knows_run(self, run: str) -> bool:
+        """The work of a run is written down as given, with the run's id."""
+        return run in self._kept_runs
+
+    def take_run(self, run: str, worth: Mapping[str, Worth]) -> None:
+        """Have the nodes of a schedule's run visited, once; `knows_run` says when that is written down.
+        InputError for a node that is not there, UnavailableError where the fleet does not fly."""
+        traffic = self._asked_traffic()
+        if run not in self._runs:
+            traffic.ask_worth(worth)
+            self._runs = (*self._runs, run)[-_MOST_RUNS:]
 
     def _asked_traffic(self) -> StationTraffic:
         """Of which a person asks something: drones may leave the ground for it."""

@@ -152,10 +152,14 @@ class StationTraffic:
     def ask(self, nodes: Sequence[str], drone: str = "") -> None:
         """Have these nodes visited, by that drone or by whichever.  InputError for one that the floor
         lacks."""
-        if unknown := [node for node in nodes if node not in self._floor.lanes.column_of]:
+        self.ask_worth(dict.fromkeys(nodes, Worth(Value.ASKED)), drone)
+
+    def ask_worth(self, worth: Mapping[str, Worth], drone: str = "") -> None:
+        """The same, for nodes that are worth more or less."""
+        if unknown := [node for node in worth if node not in self._floor.lanes.column_of]:
             raise InputError(f"no node is called {unknown[0]}")
-        asked = Worth(Value.ASKED)
-        self._want(work for work in self._work(lambda _: asked, drone) if work.node in nodes)
+        work = self._work(lambda node: worth.get(node, UNKNOWN), drone)
+        self._want(one for one in work if one.node in worth)
 
     def ask_by_value(
         self, worth: Mapping[str, Worth], nodes: int | None = None, aisles: int | None = None

@@ -23,13 +23,16 @@ from flightd.core.types import CommandKind, Phase
 from flightd.core.utc_time import utc_time
 from flightd.fleet.schedule.due import LOOK_BACK, decide
 from flightd.fleet.schedule.rule import MOST_WINDOW, Occurrence
+from flightd.fleet.traffic.valued_work import Worth
+from flightd.fleet.traffic.work_queue import Value
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.bounded import Threads
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.manager_routes import Managers
 from flightd.ground.messages import Act
 from flightd.ground.missions.mission_book import MissionBook
-from flightd.ground.schedules.kept import CountMission, Schedule
+from flightd.ground.schedules.fleet_runs import ScheduledFleet, fleet_objection
+from flightd.ground.schedules.kept import CountAll, CountMission, Schedule
 from flightd.ground.schedules.schedule_book import MOST_RUNS, ORDERED, Run, RunState, ScheduleBook
 from flightd.ground.schedules.start_rules import PLAN, Cause, Objection, is_flying_plan, objection
 from flightd.ground.schedules.work import Work, work_of
@@ -40,6 +43,8 @@ _MOST_WORDS = 300
 _GIVEN_UP_S: Final = 3600.0
 """So long after the end of its time a run that was ordered waits for the drone to be heard."""
 _QUIET: Final = Objection(Cause.QUIET, "these are quiet hours")
+_NO_ANSWER: Final = "the drone did not answer in time"
+_ALL_LEVELS: Final = Objection(Cause.WORK, "the fleet counts all levels: leave them out")
 _OFF: Final = Objection(Cause.OFF, "the station was off, or its clock jumped")
 
 
@@ -106,7 +111,10 @@ class NightShift:
         audit: Audit,
         managers: Managers | None = None,
         clock: StationClock = THIS_MACHINE,
+        fleet: ScheduledFleet | None = None,
     ) -> None:
+        """What is due for a drone of the `fleet` is work of all its drones."""
+        self._fleet = fleet
         self._book = book
         self._missions = missions
         self._store = store
@@ -191,18 +199,24 @@ class NightShift:
             await self._wait(schedule, due, known, none)
             return
         drone.attends_run = True
+        fleet = self._fleet_of(drone)
         against = self._objection(schedule, drone)
         status, welcome = drone.heard, drone.welcome
-        if against is not None or status is None or welcome is None:
+        floor = fleet.map if fleet is not None and against is None else None
+        if floor is None and welcome is not None and status is not None:
+            floor = welcome.floor
+        if against is not None or floor is None:
             await self._wait(schedule, due, known, against or _OFF)
             return
         try:
-            work: Work = await self._threads.run(
-                work_of, schedule, welcome.floor, self._missions, self._store, now
-            )
+            work: Work = await self._threads.run(work_of, schedule, floor, self._missions, self._store, now)
         except FlightdError as err:
             await self._wait(schedule, due, known, Objection(Cause.WORK, str(err)))
             return
+        if fleet is not None and work.levels:
+            await self._wait(schedule, due, known, _ALL_LEVELS)
+            return
+        session = "" if fleet is not None or welcome is None else welcome.session
         run = Run(
             schedule=schedule.id,
             day=due.day,
@@ -211,19 +225,46 @@ class NightShift:
             changed_ns=self._clock.utc_ns(),
             drone=drone.name,
             plan=f"{PLAN}{uuid.uuid4().hex}",
-            session=welcome.session,
+            session=session,
             nodes=work.nodes,
             levels=work.levels,
         )
         await self._threads.run(self._book.write, run)
-        await self._order(schedule, run, drone, may_be_started=False)
+        if fleet is not None:
+            await self._hand_over(schedule, run, fleet)
+        else:
+            await self._order(schedule, run, drone, may_be_started=False)
+
+    def _fleet_of(self, drone: ScheduledDrone) -> ScheduledFleet | None:
+        """That of which a drone is one."""
+        return self._fleet if self._fleet is not None and drone.name in self._fleet.names else None
+
+    async def _hand_over(self, schedule: Schedule, run: Run, fleet: ScheduledFleet) -> None:
+        """Give the fleet what is due, once: it keeps the run's id beside the work.  Until that is written
+        down the run is none that was started."""
+        if not fleet.knows_run(run.plan):
+            try:
+                fleet.take_run(run.plan, _worth(schedule, run.nodes))
+            except FlightdError as err:
+                await self._refused(schedule, run, RunState.WAITING, str(err))
+                return
+        if fleet.knows_run(run.plan):
+            await self._write(replace(run, state=RunState.STARTED, cause="", why=""))
+            self._write_down(schedule, run, "accepted", f"{run.day}: {', '.join(run.nodes)}")
 
     async def _resume(self, schedule: Schedule, run: Run, now: datetime) -> None:
         """Go on with a run that was ordered and not answered: the link was lost, or the station ended."""
         drone = self._drones.get(run.drone)
         status = None if drone is None else drone.heard
         over_s = (self._clock.utc_ns() - run.due_ns) / 1e9 - schedule.kept.late_minutes * 60
-        if drone is None or status is None:
+        fleet = None if drone is None or run.session else self._fleet_of(drone)
+        if drone is not None and fleet is not None:
+            may = over_s < 0 and not schedule.rule.is_quiet(now) and self._objection(schedule, drone) is None
+            if may or fleet.knows_run(run.plan):
+                await self._hand_over(schedule, run, fleet)
+            elif over_s >= 0:
+                await self._write(replace(run, state=RunState.UNKNOWN, why=_NO_ANSWER))
+        elif drone is None or status is None:
             if over_s > _GIVEN_UP_S:
                 await self._write(replace(run, state=RunState.UNKNOWN, why="the drone was not heard again"))
         elif status.session != run.session:
@@ -232,7 +273,7 @@ class NightShift:
         elif status.plan == run.plan and status.phase is not Phase.PREFLIGHT:
             await self._write(replace(run, state=RunState.STARTED))
         elif over_s >= 0:
-            await self._write(replace(run, state=RunState.UNKNOWN, why="the drone did not answer in time"))
+            await self._write(replace(run, state=RunState.UNKNOWN, why=_NO_ANSWER))
         elif not schedule.rule.is_quiet(now) and self._objection(schedule, drone) is None:
             await self._order(schedule, run, drone, may_be_started=True)
 
@@ -292,6 +333,9 @@ class NightShift:
         self._write_down(schedule, run, "missed", f"{run.day}: {why.why}")
 
     def _objection(self, schedule: Schedule, drone: ScheduledDrone) -> Objection | None:
+        fleet = self._fleet_of(drone)
+        if fleet is not None:
+            return fleet_objection(schedule.kept.site, fleet, self._drones)
         return objection(
             schedule.kept.site,
             drone.welcome,
@@ -321,6 +365,13 @@ def _not_ordered(schedule: Schedule, due: Occurrence, state: RunState, why: Obje
         cause=why.cause.value,
         why=why.why,
     )
+
+
+def _worth(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Worth]:
+    """What a person chose goes before what is only the oldest, which is worth less from one to the next."""
+    if not isinstance(schedule.kept.count, CountAll):
+        return dict.fromkeys(nodes, Worth(Value.ASKED))
+    return {node: Worth(Value.OLD, float(len(nodes) - i)) for i, node in enumerate(nodes)}
 
 
 def _ns(at: datetime) -> int:

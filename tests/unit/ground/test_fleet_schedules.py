@@ -1,0 +1,208 @@
+"""Schedules of a drone that the station's fleet flies: what is due is work of the whole fleet, given once."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flightd.adapters.ground_link.floor_status import floor_status
+from flightd.adapters.ground_link.messages.answers import Welcome
+from flightd.adapters.ground_link.messages.base import Role
+from flightd.adapters.ground_link.messages.published import StatusReport
+from flightd.core.types import Phase
+from flightd.ground.fleet.fleet_memory import FleetMemory
+from flightd.ground.missions.mission_book import MissionBook
+from flightd.ground.schedules.kept import CountAisles, Kept, QuietHours
+from flightd.ground.schedules.night_shift import NightShift, StationClock
+from flightd.ground.schedules.schedule_book import Run, RunState, ScheduleBook
+from tests.rigs.paper_drones import PaperDrone
+from tests.rigs.paper_fleet import PaperFleet, fly, until
+
+NIGHTLY = Kept("hall", "Aisle A", "a", CountAisles(("A",)), "22:00", "UTC")
+AISLE = {"A1", "A2", "A3", "A4", "A5"}
+DUE = datetime(2026, 3, 1, 22, 0, tzinfo=UTC)
+
+
+@dataclass
+class Link:
+    """What of `DroneLink` a schedule of a fleet's drone needs."""
+
+    drone: PaperDrone
+    attends_run: bool = False
+    by_person_at_s: float = -1e9
+
+    @property
+    def name(self) -> str:
+        return self.drone.name
+
+    @property
+    def welcome(self) -> Welcome:
+        floor = floor_status(self.drone.site)
+        return Welcome(version=1, request="", flightd="", session="", role=Role.OPERATOR, client="",
+                       picture_fps=0.0, floor=floor, events=())  # fmt: skip
+
+    @property
+    def heard(self) -> StatusReport:
+        return self.drone.status
+
+    async def act(self, *_: Any, **__: Any) -> Any:
+        pytest.fail("the fleet flies it")
+
+    plan_flight = act
+
+
+class Station:
+    """A night shift beside a fleet; each station that follows has the same folder."""
+
+    def __init__(self, fleet: PaperFleet, folder: Path, kept: Kept = NIGHTLY) -> None:
+        self.fleet, self.folder, self.now = fleet, folder, DUE - timedelta(minutes=1)
+        self.book = ScheduleBook(folder)
+        self.book.keep("schedule-1", kept, self.utc_ns())
+        self.lines: list[str] = []
+        self.begin()
+
+    def begin(self) -> None:
+        """Another station."""
+        links = {name: Link(drone) for name, drone in self.fleet.drones.items()}
+        clock, own = StationClock(self.utc_ns, rest_s=0.0), self.fleet.own
+        missions = MissionBook(self.folder)
+        self.shift = NightShift(self.book, missions, None, links, self, None, clock, own)  # type: ignore[arg-type]
+
+    def utc_ns(self) -> int:
+        return int(self.now.timestamp()) * 10**9
+
+    def write_down(self, who: Any, address: str, act: str, target: str, **outcome: str) -> None:
+        del who, address, act, target
+        self.lines.append(outcome["outcome"])
+
+    async def look(self, at: datetime = DUE) -> Run | None:
+        self.now = at
+        await self.shift.step()
+        runs = self.book.runs("schedule-1")
+        return runs[0] if runs else None
+
+
+def night(tmp_path: Path, go: Callable[[Station], Coroutine[Any, Any, None]], kept: Kept = NIGHTLY) -> None:
+    async def with_station(fleet: PaperFleet) -> None:
+        await go(Station(fleet, tmp_path, kept))
+
+    fly(with_station, "ab", memory=FleetMemory(tmp_path), unattended=True)
+
+
+def open_or_given(fleet: PaperFleet) -> set[str]:
+    return {*fleet.state["open"], *fleet.state["given"]}
+
+
+def test_what_is_due_is_flown_by_whichever_drones_have_the_time_and_once(tmp_path: Path) -> None:
+    async def go(station: Station) -> None:
+        run = await station.look()
+        assert run is not None
+        assert run.state is RunState.ORDERED, "nothing is written down yet"
+        await until(lambda: bool(station.fleet.state["given"]), 30)
+        run = await station.look()
+        assert run is not None
+        assert (run.state, {*run.nodes}, station.lines) == (
+            RunState.STARTED,
+            AISLE,
+            ["accepted"],
+        )
+        await until(lambda: {*station.fleet.state["done"]} == AISLE, 200)
+        await station.look(DUE + timedelta(minutes=30))
+        await asyncio.sleep(5.0)
+        assert open_or_given(station.fleet) == set()
+
+    night(tmp_path, go)
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_a_station_that_is_killed_as_it_gives_it_gives_it_once(tmp_path: Path, written: bool) -> None:
+    async def go(station: Station) -> None:
+        fleet = station.fleet
+        await station.look()
+        if written:
+            await until(lambda: len(fleet.state["done"]) == 1, 100)
+        await fleet.kill()
+        await asyncio.sleep(5.0)
+        fleet.start_again()
+        station.begin()
+        await until(lambda: fleet.state["flies"], 60)
+        done = {*fleet.state["done"]}
+        assert bool(done) is written
+        for minute in range(5):
+            run = await station.look(DUE + timedelta(minutes=minute))
+            await asyncio.sleep(1.0)
+        assert run is not None
+        assert run.state is RunState.STARTED
+        assert not done & open_or_given(fleet), "what is done is not asked for again"
+        await until(lambda: {*fleet.state["done"]} == AISLE, 300)
+
+    night(tmp_path, go)
+
+
+def test_what_keeps_all_drones_on_the_ground_is_told_and_the_run_is_caught_up(tmp_path: Path) -> None:
+    async def go(station: Station) -> None:
+        for drone in station.fleet.drones.values():
+            drone.obstacles = ("the aisle is not closed",)
+        run = await station.look()
+        assert run is not None
+        assert (run.state, run.cause, run.why) == (RunState.WAITING, "not_ready", "the aisle is not closed")
+        assert open_or_given(station.fleet) == set()
+        station.fleet.drones["b"].obstacles = ()
+        await station.look(DUE + timedelta(minutes=20))
+        await until(lambda: {*station.fleet.state["given"].values()} == {"b"}, 100)
+        run = await station.look(DUE + timedelta(minutes=21))
+        assert run is not None
+        assert run.state is RunState.STARTED
+
+    night(tmp_path, go)
+
+
+def test_in_quiet_hours_it_waits_and_is_caught_up(tmp_path: Path) -> None:
+    quiet = Kept("hall", "A", "a", CountAisles(("A",)), "22:00", "UTC", quiet=(QuietHours("21:30", "22:30"),))
+
+    async def go(station: Station) -> None:
+        run = await station.look()
+        assert run is not None
+        assert (run.state, run.cause) == (RunState.WAITING, "quiet")
+        await station.look(DUE + timedelta(minutes=31))
+        await until(lambda: bool(station.fleet.state["given"]), 30)
+
+    night(tmp_path, go, quiet)
+
+
+def test_levels_are_refused_for_a_fleet_counts_all(tmp_path: Path) -> None:
+    async def go(station: Station) -> None:
+        run = await station.look()
+        assert run is not None
+        assert (run.state, run.cause) == (RunState.WAITING, "work")
+        assert "counts all levels" in run.why
+
+    night(tmp_path, go, Kept("hall", "A", "a", CountAisles(("A",), (1,)), "22:00", "UTC"))
+
+
+@pytest.mark.parametrize("change", [datetime(2026, 3, 29, tzinfo=UTC), datetime(2026, 10, 25, tzinfo=UTC)])
+def test_over_a_change_of_the_clock_each_night_is_given_once(tmp_path: Path, change: datetime) -> None:
+    kept = Kept("hall", "A", "a", CountAisles(("A",)), "02:30", "Europe/Berlin")
+
+    async def go(station: Station) -> None:
+        station.now = change - timedelta(days=1, hours=12)
+        station.book.keep("schedule-1", kept, station.utc_ns())
+        for half_hour in range(48 * 3):
+            await station.look(change - timedelta(days=1, hours=12) + timedelta(minutes=30 * half_hour))
+            await asyncio.sleep(1.0)
+            for drone in station.fleet.drones.values():
+                if drone.phase is Phase.DONE:
+                    drone.begin_anew()
+        runs = station.book.runs("schedule-1")
+        assert Counter(run.state for run in runs) == {RunState.STARTED: 3}
+        assert len({run.day for run in runs}) == 3
+        assert station.lines == ["accepted"] * 3
+
+    night(tmp_path, go)
