@@ -25,24 +25,29 @@ class Closure:
 
 
 class ClosedAir:
-    """The zones of one floor that are closed, by name: lanes, the vertices from which no other ones lead on,
-    and the columns over these."""
+    """The zones of one floor that are closed, by name: lanes, the vertices from which none that is open leads
+    on, and the columns over these.  A vertex between two zones is of both."""
 
     def __init__(self, lanes: LaneGraph) -> None:
         self._lanes = lanes
+        self._closed: dict[str, frozenset[int]] = {}
         self._zones: dict[str, frozenset[int]] = {}
         self._ways_home: dict[int, frozenset[int]] = {}
 
     def close(self, name: str, lanes: Iterable[int]) -> frozenset[int]:
         """Close these lanes at every level; the zone."""
-        closed = frozenset(lanes)
-        self._zones[name] = zone = closed | self._enclosed(closed)
-        self._ways_home.clear()
-        return zone
+        self._closed[name] = frozenset(lanes)
+        self._lay_out()
+        return self._zones[name]
 
     def open(self, name: str) -> None:
         """Open it again.  KeyError where nothing is closed by that name."""
-        del self._zones[name]
+        del self._closed[name]
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        everything = frozenset().union(*self._closed.values())
+        self._zones = {name: own | self._enclosed(own, everything) for name, own in self._closed.items()}
         self._ways_home.clear()
 
     @property
@@ -110,10 +115,10 @@ class ClosedAir:
             todo += fresh
         return frozenset(found)
 
-    def _enclosed(self, closed: frozenset[int]) -> frozenset[int]:
-        """The vertices from which no other lanes lead on than these, and the columns over them."""
+    def _enclosed(self, own: frozenset[int], closed: frozenset[int]) -> frozenset[int]:
+        """The ends of these lanes from which only closed ones lead on, and the columns over them."""
         lanes = self._lanes
-        ends = {end for lane in closed for end in lanes.ends_of(lane)}
+        ends = {end for lane in own for end in lanes.ends_of(lane)}
         inside = {
             vertex
             for vertex in ends

@@ -25,6 +25,17 @@ def test_a_zone_has_what_lies_within_it_and_not_its_ends() -> None:
     assert {floor.lanes.column_of[f"A{i}"] for i in (3, 4, 5, 6)} <= zone
 
 
+def test_two_halves_that_are_closed_one_by_one_have_the_node_between_them_until_one_is_open() -> None:
+    floor = Floor()
+    air, between = ClosedAir(floor.lanes), floor.lanes.over("A4")
+    assert between not in air.close("near", floor.lanes.lanes_between(BY_A[:2]))
+    assert {between, floor.lanes.column_of["A4"]} <= air.close("far", floor.lanes.lanes_between(BY_A[2:]))
+    assert all(between in zone for zone in air.zones)
+    assert air.within({"d0": [between]}) == {"near": ("d0",), "far": ("d0",)}
+    air.open("near")
+    assert between not in air.air
+
+
 def test_who_is_in_one_closed_way_does_not_leave_through_another_one() -> None:
     floor = Floor(4)
     control = floor.control
