@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
 
 import msgspec
 
 from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import InputError
 from flightd.fleet.traffic.closures import Closure
+from flightd.ground.fleet.fleet_memory import FILE
 from flightd.ground.mqtt.linked_floor import node_of_pad, open_ways
+
+SAME_M: Final = 0.3
+"""A node that is so near where it was is the same: a map may be measured anew."""
 
 
 def aisle_closure(floor: FloorStatus, aisle: str) -> Closure:
@@ -40,13 +47,26 @@ def closure_between(floor: FloorStatus, nodes: Sequence[str]) -> Closure:
     return Closure(name, tuple(sorted(ways)), f"what is between {name} is closed")
 
 
-def check_on_map(floor: FloorStatus, closures: Iterable[Closure]) -> None:
-    """InputError for a closure of which a way is on no line of this map, blocked ones among them: what it
-    closed may be flown over other nodes there."""
-    lines = open_ways(msgspec.structs.replace(floor, ways=()))
-    for closure in closures:
-        if not lines.issuperset(closure.ways):
-            raise InputError(f"{closure.why}, but on another map", remedy="open it, and close it again")
+def places_of(floor: FloorStatus, closure: Closure) -> dict[str, tuple[float, float]]:
+    """Where its nodes are, x and y in metres: by that it is known on a map with other names."""
+    return {node.id: (node.x_m, node.y_m) for node in floor.nodes if node.id in closure.nodes}
+
+
+def on_map(floor: FloorStatus, closure: Closure, places: Mapping[str, tuple[float, float]]) -> Closure:
+    """The closure as this map calls its nodes, which it has at the same `places` (none: they are known by
+    their names alone).  InputError where a way of it is on no line of this map, blocked ones among them: what
+    it closed may be flown over other nodes there."""
+    names = {node: _at(floor, place) for node, place in places.items()}
+    ways = tuple(_way(names.get(a, a), names.get(b, b)) for a, b in closure.ways)
+    if not open_ways(msgspec.structs.replace(floor, ways=())).issuperset(ways):
+        raise InputError(f"{closure.why}, but on another map ({FILE})", remedy="open it, and close it again")
+    return replace(closure, ways=ways)
+
+
+def _at(floor: FloorStatus, place: tuple[float, float]) -> str:
+    """The node that is there; empty where none is."""
+    nearest = min(floor.nodes, key=lambda node: math.dist((node.x_m, node.y_m), place))
+    return nearest.id if math.dist((nearest.x_m, nearest.y_m), place) <= SAME_M else ""
 
 
 def _neighbours(floor: FloorStatus) -> Mapping[str, set[str]]:

@@ -9,8 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.fleet.traffic.closures import Closure
+from flightd.ground.fleet.closed_ways import on_map, places_of
 from flightd.ground.fleet.fleet_memory import FleetMemory, KeptClosure
 from flightd.ground.fleet.station_traffic import Aside
 
@@ -28,10 +30,9 @@ class ClosureBook:
         self._changes = asyncio.Lock()
         self._is_recalled = False
 
-    @property
-    def closures(self) -> tuple[Closure, ...]:
-        """All that is closed now."""
-        return tuple(one.closure for one in self._closed.values())
+    def on(self, floor: FloorStatus) -> tuple[Closure, ...]:
+        """All that is closed now, as this map calls it.  InputError where it is not there."""
+        return tuple(on_map(floor, one.closure, one.places) for one in self._closed.values())
 
     async def recall(self) -> None:
         """Read what is kept, once.  UnavailableError or InputError where that cannot be read: then nobody
@@ -42,12 +43,12 @@ class ClosureBook:
                 self._closed = {one.closure.name: one for one in kept}
             self._is_recalled = True
 
-    async def close(self, closure: Closure, by: str) -> None:
-        """From now on.  UnavailableError where it is closed and cannot be written down; errors as of
-        `recall`."""
+    async def close(self, closure: Closure, floor: FloorStatus, by: str) -> None:
+        """From now on, by that map.  UnavailableError where it is closed and cannot be written down; errors
+        as of `recall`."""
         await self.recall()
         async with self._changes:
-            self._closed[closure.name] = KeptClosure(closure, by, self._utc_s())
+            self._closed[closure.name] = KeptClosure(closure, by, self._utc_s(), places_of(floor, closure))
             await self._keep()
 
     async def open(self, name: str) -> None:
@@ -67,12 +68,15 @@ class ClosureBook:
         except FlightdError as err:
             raise UnavailableError(f"it holds until the station ends, for it is not kept: {err}") from err
 
-    def document(self, inside: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
-        """As JSON has it, with the drones that may be `inside` each; None where that is not known."""
+    def document(
+        self, inside: Mapping[str, Sequence[str]], flown: Mapping[str, Closure]
+    ) -> list[dict[str, Any]]:
+        """As JSON has it, with the drones that may be `inside` each; None where that is not known.  `flown`
+        are the closures that traffic keeps, by the names of its map."""
         return [
             {
                 "name": one.closure.name,
-                "ways": one.closure.ways,
+                "ways": flown.get(one.closure.name, one.closure).ways,
                 "why": one.closure.why,
                 "by": one.by,
                 "utc_s": round(one.utc_s, 1),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sqlite3
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -71,11 +71,13 @@ class KeptFleet:
 
 @dataclass(frozen=True, slots=True)
 class KeptClosure:
-    """What a person closed: who he is, and when, UTC."""
+    """What a person closed: who he is, and when, UTC; `places` are its nodes', x and y in metres (none: a
+    flightd of before kept it)."""
 
     closure: Closure
     by: str
     utc_s: float
+    places: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from flightd.fleet.traffic.work_queue import WorkQueue
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.fleet.base_orders import VERSION
-from flightd.ground.fleet.closed_ways import aisle_closure, check_on_map, closure_between
+from flightd.ground.fleet.closed_ways import SAME_M, aisle_closure, closure_between
 from flightd.ground.fleet.closure_book import ClosureBook
 from flightd.ground.fleet.fleet_drone import FleetDrone
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor, with_all_pads
@@ -214,7 +214,7 @@ class OwnFleet(VehicleSides):
     async def _made(self, floors: Mapping[str, FloorStatus], stands: Mapping[str, str]) -> FleetFloor:
         """InputError where they cannot be flown on it, or not all that is closed is there."""
         floor = await self._aside(partial(FleetFloor, floors, stands, self._cell))
-        check_on_map(floor.map, self._closures.closures)
+        self._closures.on(floor.map)
         return floor
 
     def _drones_on(self, floor: FleetFloor) -> dict[str, FleetDrone]:
@@ -287,9 +287,19 @@ class OwnFleet(VehicleSides):
                 )
             self._trouble = str(err)
             return
+        if self._fleet is not None:
+            self._give_up_moved(self._fleet[0].map, floor.map)
         kept = KeptFloor(floors, standings)
         await self._write(lambda memory: memory.begin(kept))
         await self._begin(floor, self._drones_on(floor), pace_of(standings.values()))
+
+    def _give_up_moved(self, before: FloorStatus, after: FloorStatus) -> None:
+        """A node that is called as another one was is none that somebody asked for."""
+        was = {node.id: (node.x_m, node.y_m) for node in before.nodes}
+        wanted = {*self._queue.open, *self._queue.given} & was.keys()
+        for node in after.nodes:
+            if node.id in wanted and math.dist((node.x_m, node.y_m), was[node.id]) > SAME_M:
+                self._queue.give_up(node.id, "the map has it elsewhere now: ask for it again")
 
     # what is asked of it
 
@@ -365,7 +375,7 @@ class OwnFleet(VehicleSides):
         is closed and not written down."""
         floor = self._floor
         closure = aisle_closure(floor, aisle) if aisle else closure_between(floor, nodes)
-        await self._closures.close(closure, by)
+        await self._closures.close(closure, floor, by)
         return closure.name
 
     async def open(self, name: str) -> None:
@@ -386,7 +396,8 @@ class OwnFleet(VehicleSides):
             "done": list(self._queue.done),
             "not_done": {**self._queue.reasons, **held},
         }
-        closed = self._closures.document(told.get("inside", {}))
+        flown = {} if self._traffic is None else self._traffic.closed
+        closed = self._closures.document(told.get("inside", {}), flown)
         flies = {"flies": self._traffic is not None, "trouble": self._trouble}
         docks = told.get("docks", [])
         return {**flies, "drones": told.get("drones", {}), **work, "closed": closed, "docks": docks}

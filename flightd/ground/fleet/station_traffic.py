@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Protocol, TypeAlias, TypeVar
 
+from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import InputError
 from flightd.fleet.traffic.cells import CellSize
 from flightd.fleet.traffic.closures import Closure
@@ -82,9 +83,8 @@ class Aside(Protocol):
 class Closures(Protocol):
     """What people closed."""
 
-    @property
-    def closures(self) -> Sequence[Closure]:
-        """All of it, now."""
+    def on(self, floor: FloorStatus) -> Sequence[Closure]:
+        """All of it, now, as that map calls it."""
         ...
 
 
@@ -145,6 +145,11 @@ class StationTraffic:
         return any(drone.objection for drone in drones) and all(drone.stands for drone in drones)
 
     @property
+    def closed(self) -> dict[str, Closure]:
+        """What it keeps closed, by name."""
+        return {one.name: one for one in self._closed}
+
+    @property
     def flown(self) -> frozenset[str]:
         """The drones that traffic flies now."""
         return frozenset(self._flown)
@@ -167,7 +172,7 @@ class StationTraffic:
         """Have the most valuable (`most_valuable`) nodes visited of those that face a shelf, do not wait yet,
         and are not closed; which."""
         shelved = {node.id for node in self._floor.nodes if node.levels} or set(self._floor.lanes.column_of)
-        closed = {node for one in self._closures.closures for node in one.nodes}
+        closed = {node for one in self._closures.on(self._floor.map) for node in one.nodes}
         known = {*self._queue.open, *self._queue.given, *self._asked, *closed}
         work = self._work(lambda node: worth.get(node, UNKNOWN))
         chosen = most_valuable(
@@ -212,7 +217,7 @@ class StationTraffic:
     def _call_back(self) -> set[str]:
         """Who was released into what is closed since then, and is to be called off: as soon as it flies.  It
         ends at its next node, and is flown out of there."""
-        closed, before = self._closures.closures, self._closed
+        closed, before = self._closures.on(self._floor.map), self._closed
         self._closed, lanes = closed, self._control.lanes
         air = lanes.lanes_between(way for one in closed if one not in before for way in one.ways)
         self._called_back |= {n for n in self._flown if not air.isdisjoint(self._control.drones[n].air)}

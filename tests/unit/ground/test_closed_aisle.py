@@ -8,6 +8,7 @@ import math
 import os
 import random
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,12 @@ import msgspec
 import pytest
 
 from flightd.adapters.ground_link.floor_status import floor_status
-from flightd.adapters.ground_link.messages.floor import FloorWay
+from flightd.adapters.ground_link.messages.floor import FloorStatus, FloorWay
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.cells import CellSize
 from flightd.fleet.traffic.closures import Closure
-from flightd.ground.fleet.closed_ways import aisle_closure, check_on_map, closure_between
+from flightd.ground.fleet.closed_ways import aisle_closure, closure_between, on_map, places_of
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor, with_all_pads
 from flightd.ground.fleet.fleet_memory import FILE, FleetMemory, KeptClosure
 from flightd.ground.messages import Act
@@ -375,16 +376,55 @@ def test_what_is_not_there_is_refused_and_a_pads_own_way_is_not_of_its_aisle() -
         aisle_closure(spur, "A")
 
     b2_b4 = aisle_closure(floor, "B")
-    check_on_map(msgspec.structs.replace(floor, ways=(FloorWay("B2", "B3", closed=True),)), [b2_b4])
+    at = places_of(floor, b2_b4)
+    on_map(msgspec.structs.replace(floor, ways=(FloorWay("B2", "B3", closed=True),)), b2_b4, at)
     nodes = tuple(node for node in floor.nodes if node.id != "B3")
     with pytest.raises(InputError, match="aisle B is closed, but on another map"):
-        check_on_map(msgspec.structs.replace(floor, nodes=nodes), [b2_b4])
+        on_map(msgspec.structs.replace(floor, nodes=nodes), b2_b4, at)
 
     async def go(fleet: PaperFleet) -> None:
         with pytest.raises(InputError, match="nothing is closed that is called A"):
             await fleet.own.open("A")
 
     fly(go, "a")
+
+
+def numbered_anew(floor: FloorStatus, off_m: float = 0.0) -> FloorStatus:
+    """Aisle B is counted from its other end; B3 is so far off."""
+    places = {node.id: (node.x_m, node.y_m) for node in floor.nodes}
+    nodes = []
+    for node in floor.nodes:
+        x_m, y_m = places[f"B{6 - int(node.id[1])}" if node.aisle == "B" else node.id]
+        nodes.append(msgspec.structs.replace(node, x_m=x_m + off_m * (node.id == "B3"), y_m=y_m))
+    return msgspec.structs.replace(floor, nodes=tuple(nodes))
+
+
+def test_what_is_closed_stays_where_it_is_whatever_the_map_calls_it() -> None:
+    floor = floor_status(hall("a"))
+    near = closure_between(floor, ["B2", "B3"])
+    at = places_of(floor, near)
+    assert on_map(floor, near, at) == near
+    assert on_map(numbered_anew(floor), near, at).ways == (("B3", "B4"),)
+    assert on_map(numbered_anew(floor, 0.1), near, at).ways == (("B3", "B4"),)
+    with pytest.raises(InputError, match=r"is closed, but on another map \(fleet.db\)"):
+        on_map(numbered_anew(floor, 0.5), near, at)
+    assert on_map(numbered_anew(floor), near, {}).ways == near.ways, "a flightd of before knew names alone"
+
+
+def test_work_that_was_asked_for_is_not_done_at_another_node_that_is_called_so_now() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        for drone in fleet.drones.values():
+            drone.never_starts = True
+        fleet.own.ask(["A3", "A4"])
+        before = hall("a").nodes["A3"]
+        moved = replace(before, x_m=before.x_m + 0.5)
+        for name, drone in fleet.drones.items():
+            drone.site = replace(hall(name), nodes={**hall(name).nodes, "A3": moved})
+            drone.begin_anew()
+        await until(lambda: "A3" in fleet.state["not_done"], 60)
+        assert fleet.state["not_done"] == {"A3": "the map has it elsewhere now: ask for it again"}
+
+    fly(go, "ab")
 
 
 def test_every_drone_comes_home_out_of_a_closed_aisle_where_each_map_has_its_own_pad_alone() -> None:
