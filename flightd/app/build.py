@@ -199,7 +199,7 @@ def assemble(
         counting=counting,
         recorder=recorder,
         ground=ground,
-        progress=NOTHING_KEPT if progress is None else progress_file(progress, site.name),
+        progress=NOTHING_KEPT if progress is None else progress_file(progress, site),
         learnt=NOTHING_KEPT if learnt is None else learnt_file(learnt, config),
         publishers=publishers,
         share_pose=_pose_sharing(config, site, vehicle),

@@ -7,12 +7,17 @@ says is flown on the next start when it is asked to.
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Final
 
 from flightd.adapters.store.kept_file import KeptFile
 from flightd.core.errors import InputError
 from flightd.site.site import Site
+
+_SAME_M: Final = 0.3
+"""A node that is so near where it was is the same: a map may be measured anew."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,19 +39,32 @@ def load_left_over(path: Path, site: Site) -> LeftOver:
         told = json.loads(path.read_text(encoding="utf-8"))
         name = told["site"]
         left = LeftOver(tuple(map(str, told["remaining"])), str(told["stand"]), float(told["yaw_rad"]))
+        at = {str(node): (float(x_m), float(y_m)) for node, (x_m, y_m) in told.get("at", {}).items()}
     except OSError as err:
         raise NothingLeftError(f"{path}: {err.strerror}; there is nothing to resume") from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise InputError(f"{path}: not a progress file; delete it and start without --resume") from None
     if name != site.name or not {*left.remaining, left.stand} <= site.nodes.keys():
         raise InputError(f"{path}: progress on site {name}, not on {site.name}; start without --resume")
+    known = [node for node in at if node in site.nodes]
+    if moved := [node for node in known if math.dist(_place(site, node), at[node]) > _SAME_M]:
+        raise InputError(
+            f"{path}: {moved[0]} lies elsewhere on {site.name} than it did then; start without --resume"
+        )
     if not left.remaining:
         raise NothingLeftError(f"{path}: every stop was made; start without --resume")
     return left
 
 
-def progress_file(path: Path, site: str) -> KeptFile[LeftOver]:
-    """Keeps what is left over on a site of that name."""
-    return KeptFile(
-        path, "progress", lambda left: json.dumps({"site": site, **asdict(left)}, ensure_ascii=False)
-    )
+def progress_file(path: Path, site: Site) -> KeptFile[LeftOver]:
+    """Keeps what is left over on a site, and where that is."""
+
+    def text(left: LeftOver) -> str:
+        at = {node: _place(site, node) for node in (left.stand, *left.remaining)}
+        return json.dumps({"site": site.name, **asdict(left), "at": at}, ensure_ascii=False)
+
+    return KeptFile(path, "progress", text)
+
+
+def _place(site: Site, node: str) -> tuple[float, float]:
+    return site.nodes[node].x_m, site.nodes[node].y_m

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -26,7 +27,7 @@ LARGE = load_site(CONFIGS / "site-large.toml")
 
 async def kept(path: Path, *states: tuple[str, ...]) -> None:
     """Put the states one after the other, with and without time to write, then lose the task."""
-    file = progress_file(path, "demo")
+    file = progress_file(path, DEMO)
     task = asyncio.ensure_future(file.run())
     for i, state in enumerate(states):
         file.put(LeftOver(state, "A1", 3.0))
@@ -65,9 +66,24 @@ def test_another_sites_progress_and_rubbish_are_refused(tmp_path: Path) -> None:
             load_left_over(path, DEMO)
 
 
+def test_what_is_left_at_nodes_that_lie_elsewhere_now_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "progress.json"
+    real(kept(path, ("A2", "A3")))
+    for off_m, is_same in ((0.1, True), (0.6, False)):
+        a3 = DEMO.nodes["A3"]
+        site = replace(DEMO, nodes={**DEMO.nodes, "A3": replace(a3, x_m=a3.x_m + off_m)})
+        if is_same:
+            assert load_left_over(path, site).remaining == ("A2", "A3")
+            continue
+        with pytest.raises(
+            InputError, match=r"progress\.json: A3 lies elsewhere on demo .* without --resume"
+        ):
+            load_left_over(path, site)
+
+
 def test_a_disk_that_refuses_is_trouble_not_the_end(tmp_path: Path) -> None:
     (tmp_path / "state").write_text("a file where a folder should be")
-    file = progress_file(tmp_path / "state" / "progress.json", "demo")
+    file = progress_file(tmp_path / "state" / "progress.json", DEMO)
 
     async def run() -> None:
         file.put(LeftOver(("A2",), "A1", 0.0))
@@ -85,7 +101,7 @@ def test_a_disk_that_hangs_does_not_keep_the_end_of_a_flight_waiting(
     monkeypatch.setattr(kept_file, "replace_file", lambda *_: released.wait(10.0))
 
     async def test() -> None:
-        file = progress_file(tmp_path / "progress.json", "demo")
+        file = progress_file(tmp_path / "progress.json", DEMO)
         task = asyncio.ensure_future(file.run())
         file.put(LeftOver(("A2",), "A1", 3.0))
         await asyncio.sleep(0.05)
