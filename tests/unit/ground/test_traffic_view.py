@@ -60,9 +60,9 @@ def test_whose_flight_is_over_is_told_to_rest_and_what_it_waits_for() -> None:
     async def go(fleet: PaperFleet) -> None:
         fleet.own.ask(["A2"], "a")
         await until(lambda: fleet.drones["a"].phase is Phase.DONE, 100)
-        await until(lambda: not fleet.flown("a"))
+        await until(lambda: fleet.state["drones"]["a"]["rests"])
         told = fleet.state["drones"]["a"]
-        assert told["rests"]
+        assert not told["flown"]
         assert told["why"] == "its flight is over: it flies the next one once its flightd was started anew"
 
     fly(go)
