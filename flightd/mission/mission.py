@@ -406,7 +406,7 @@ class Mission:
         """What the phase that begins starts with."""
         match self.phase:
             case Phase.PREFLIGHT if trigger is Trigger.DOWN_AS_TOLD:
-                self._stand(s.now_ns)
+                self._stand()
             case Phase.PREFLIGHT:
                 self._await_start()
             case Phase.TAKE_OFF:
@@ -427,14 +427,13 @@ class Mission:
                 text = f"found flying in mode {s.vehicle.mode} at {s.height_m:.1f} m: level, then landing"
                 self._events.report(s.now_ns, EventLevel.ERROR, "restart", text)
 
-    def _stand(self, now_ns: int) -> None:
+    def _stand(self) -> None:
         """On the pad that it was told: the next flight begins here, and somebody has to order it."""
         goal = self.goal
         self._steering.anchor = (goal.x_m, goal.y_m)
         self._clearance.autostart = False
         self._charging.begin_anew()
         self._route.begin(self._plan.begin_at(goal.node, goal.yaw_rad))
-        self._events.report(now_ns, EventLevel.INFO, "pad", f"stands on the pad at {goal.node}")
 
     def _go_on(self, s: MissionInputs) -> None:
         """To the next stop, which is the way back where the battery does not reach another one."""

@@ -13,7 +13,7 @@ class Trigger(enum.Enum):
     PILOT_TOOK = "the pilot took control"
     STOP = "stop ordered"
     DOWN_TO_SWAP = "down on the pad for a fresh battery"
-    DOWN_AS_TOLD = "down on the pad that it was told"
+    DOWN_AS_TOLD = "down as it was told"
     NOT_COUNTED = "nothing was counted"
     DISARMED = "the vehicle disarmed"
     VANISHED = "the vehicle stayed silent"

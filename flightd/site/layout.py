@@ -238,7 +238,7 @@ def _check_pads(pads: tuple[Pad, ...], nodes: dict[str, Node]) -> tuple[Pad, ...
         if any(pad.id == other.id or pad.node == other.node for other in pads[:i]):
             raise LayoutError(f"pad[{i}] ({pad.id})", "its id or node is taken by an earlier pad")
         if pad.shared and (pad.start or not pad.charge):
-            raise LayoutError(f"pad[{i}] ({pad.id}).shared", "a shared pad charges, and has start = false")
+            raise LayoutError(f"pad[{i}] ({pad.id}).shared", "needs charge = true, start = false")
     return pads
 
 

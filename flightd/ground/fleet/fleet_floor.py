@@ -50,7 +50,7 @@ def own_pad(drone: str, floor: FloorStatus, stands_on: str) -> OwnPad:
         if pad.charge and not pad.shared and node_of_pad(floor, pad) != floor.home:
             raise InputError(
                 f"{drone} would come down on the pad {pad.id}, too, on a low battery",
-                remedy="let its site file say charge = false of every pad but its own, or shared = true",
+                remedy="let its site file say charge = false of every pad but its own",
             )
     if stands_on not in {floor.home, *(node_of_pad(floor, pad) for pad in _shared(floor))}:
         raise InputError(
@@ -69,25 +69,20 @@ class FleetFloor:
 
     def __init__(self, floors: Mapping[str, FloorStatus], stands: Mapping[str, str], cell: CellSize) -> None:
         first, *others = floors
-        self._like = _without_pads(floors[first])
+        self._like = _without_own_pads(floors[first])
         for other in others:
             if not self.is_of(floors[other]):
                 raise InputError(
                     f"{first} and {other} fly by different maps: {floors[first].name}, {floors[other].name}",
                     remedy="give both the same site file, but for their pads",
                 )
-            if _shared(floors[other]) != _shared(floors[first]):
-                raise InputError(
-                    f"{first} and {other} share different pads", remedy="give both the same shared pads"
-                )
-        self._shared = _shared(floors[first])
         self.map = with_all_pads([*floors.values()])
         self.nodes = floors[first].nodes
         self.racks = floors[first].racks
         self.pads = {drone: own_pad(drone, floor, stands[drone]) for drone, floor in floors.items()}
         docks = {
             pad.id: OwnPad(node_of_pad(floors[first], pad), pad.x_m, pad.y_m, charges=True)
-            for pad in self._shared
+            for pad in _shared(floors[first])
         }
         _check_apart([*self.pads.items(), *docks.items()], cell)
         self.lanes = _lanes(floors[first], self.pads, docks)
@@ -113,16 +108,14 @@ class FleetFloor:
         return frozenset(range(len(self.lanes.boxes)))
 
     def is_of(self, floor: FloorStatus) -> bool:
-        """Whether a drone's map is this floor, but for pads."""
-        return _without_pads(floor) == self._like
+        """Whether a drone's map is this floor, but for its own pads."""
+        return _without_own_pads(floor) == self._like
 
     def objection(self, drone: str, floor: FloorStatus, stands_on: str | None) -> str:
         """Why a drone that flies by its map `floor`, and stands beside that node, is not flown on this one;
         empty where it is."""
         if not self.is_of(floor):
             return f"it flies by another map: {floor.name}"
-        if _shared(floor) != self._shared:
-            return "it shares other pads than before"
         try:
             pad = own_pad(drone, floor, floor.home if stands_on is None else stands_on)
         except InputError as err:
@@ -215,14 +208,14 @@ def _apart_m(box: Box, at: tuple[float, float]) -> float:
 
 
 def with_all_pads(floors: Sequence[FloorStatus]) -> FloorStatus:
-    """The first map, with the pads of all that are the same but for pads."""
-    like = _without_pads(floors[0])
-    pads = (pad for floor in floors if _without_pads(floor) == like for pad in floor.pads)
+    """The first map, with the pads of all that are the same but for own pads."""
+    like = _without_own_pads(floors[0])
+    pads = (pad for floor in floors if _without_own_pads(floor) == like for pad in floor.pads)
     return msgspec.structs.replace(floors[0], pads=tuple(dict.fromkeys(pads)))
 
 
-def _without_pads(floor: FloorStatus) -> FloorStatus:
-    return msgspec.structs.replace(floor, home="", pads=())
+def _without_own_pads(floor: FloorStatus) -> FloorStatus:
+    return msgspec.structs.replace(floor, home="", pads=_shared(floor))
 
 
 def _shared(floor: FloorStatus) -> tuple[FloorPad, ...]:

@@ -299,7 +299,7 @@ class OwnFleet(VehicleSides):
         wanted = {*self._queue.open, *self._queue.given} & was.keys()
         for node in after.nodes:
             if node.id in wanted and math.dist((node.x_m, node.y_m), was[node.id]) > SAME_M:
-                self._queue.give_up(node.id, "the map has it elsewhere now: ask for it again")
+                self._queue.give_up(node.id, "the drones' map has it no more")
 
     # what is asked of it
 
@@ -332,7 +332,7 @@ class OwnFleet(VehicleSides):
     @property
     def trouble(self) -> str:
         """Why it does not fly; empty where it does."""
-        return "" if self._traffic is not None else self._trouble or "its drones were not heard yet"
+        return "" if self._traffic is not None else self._trouble or "no drone told its map yet"
 
     def knows_run(self, run: str) -> bool:
         """The work of a run is written down as given, with the run's id."""

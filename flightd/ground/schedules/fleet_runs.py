@@ -82,7 +82,7 @@ def fleet_objection(site: str, fleet: ScheduledFleet, drones: Mapping[str, Heard
 def _none_ready(fleet: ScheduledFleet, own: Mapping[str, HeardDrone]) -> Objection | None:
     """Why no drone would fly now: of those that are the fleet's one has to fly, or nothing to keep it on the
     ground."""
-    why = Objection(Cause.PERSON, "people have all drones")
+    why = Objection(Cause.PERSON, "a person has it")
     for name, drone in own.items():
         status = drone.heard
         if status is None or not fleet.flies(name):

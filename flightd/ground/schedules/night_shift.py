@@ -44,7 +44,7 @@ _GIVEN_UP_S: Final = 3600.0
 """So long after the end of its time a run that was ordered waits for the drone to be heard."""
 _QUIET: Final = Objection(Cause.QUIET, "these are quiet hours")
 _NO_ANSWER: Final = "the drone did not answer in time"
-_ALL_LEVELS: Final = Objection(Cause.WORK, "the fleet counts all levels: leave them out")
+_ALL_LEVELS: Final = Objection(Cause.WORK, "the fleet counts all levels")
 _OFF: Final = Objection(Cause.OFF, "the station was off, or its clock jumped")
 
 

@@ -422,7 +422,7 @@ def test_work_that_was_asked_for_is_not_done_at_another_node_that_is_called_so_n
             drone.site = replace(hall(name), nodes={**hall(name).nodes, "A3": moved})
             drone.begin_anew()
         await until(lambda: "A3" in fleet.state["not_done"], 60)
-        assert fleet.state["not_done"] == {"A3": "the map has it elsewhere now: ask for it again"}
+        assert fleet.state["not_done"] == {"A3": "the drones' map has it no more"}
 
     fly(go, "ab")
 

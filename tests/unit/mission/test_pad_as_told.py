@@ -97,5 +97,5 @@ def test_by_itself_it_never_turns_to_a_pad_that_is_shared() -> None:
 def test_a_shared_pad_is_written_and_read_and_nobody_starts_there_at_first() -> None:
     text = site_toml(HALL)
     assert parse_site(text, "hall").pads == HALL.pads
-    with pytest.raises(InputError, match=r"pad\[1\] \(dock\).shared: a shared pad charges"):
+    with pytest.raises(InputError, match=r"pad\[1\] \(dock\).shared: needs charge"):
         parse_site(text.replace("start = false\nshared", "shared"), "hall")

@@ -16,7 +16,7 @@ export function ClosedCard({ told, floor }) {
   return html`
     <section class="card closed-card" aria-labelledby="closed">
       <h3 id="closed">${say("Closed to drones")}</h3>
-      <p class="quiet">${say("The fleet does not fly in, and leaves it. People’s orders, schedules and drones’ own rules do not heed it.")}</p>
+      <p class="quiet">${say("The fleet does not fly in, and leaves it. People’s orders and drones’ own rules do not heed it.")}</p>
       ${told.closed.length > 0
         ? html`<ul>${told.closed.map((one) => html`<${Closed} key=${one.name} one=${trouble ? { ...one, inside: null } : one} />`)}</ul>`
         : html`<p class="quiet">${say("Nothing is closed.")}</p>`}

@@ -48,7 +48,7 @@ export default function FleetPage() {
   `;
 }
 
-// Do it now, and again and again while the page is seen; what ends that.
+// Again and again while the page is seen; what ends it.
 function often(load, ms) {
   load();
   const again = setInterval(() => document.hidden || load(), ms);
@@ -71,7 +71,7 @@ function NoMap({ names }) {
   `;
 }
 
-// Who flies them, where it is not the station's traffic.
+// Who else flies them.
 function Traffic({ told, none, trouble }) {
   if (trouble) return html`<p class="card refusal" role="alert">${quoted(trouble)}</p>`;
   if (none) {

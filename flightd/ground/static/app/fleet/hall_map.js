@@ -57,7 +57,7 @@ export function HallMap({ drones, marks, told, mayChoose }) {
   `;
 }
 
-// Where traffic flies it, its base; else the way that it tells.
+// By traffic its base, else the way that it tells.
 function Released({ known, floor, told, mark, nodes }) {
   const from = placeOf({ known, floor }, told);
   const ids = told ? told.base : (known.status?.way ?? []).slice(0, OVER_NEXT);
@@ -116,10 +116,10 @@ function Pads({ drones, told, marks }) {
   return html`
     <ul class="pads" aria-label=${say("Pads")}>
       ${pads.map(
-        ({ node, owner = "", isThere, charges, shared }) => html`
-          <li key=${node} class=${isThere || shared?.taken ? "pad-taken" : ""}>
+        ({ node, owner, isThere, charges, shared }) => html`
+          <li key=${node} class=${isThere ? "pad-taken" : ""}>
             ${owner && html`<${Badge} mark=${marks.get(owner)} />`}
-            <span><strong>${say("Pad {node}:", { node })}</strong> ${shared ? sharedWords(shared) : padWords(owner, isThere)}${charges && `, ${say("charges")}`}</span>
+            <span><strong>${say("Pad {node}:", { node })}</strong> ${padWords(owner, isThere, shared)}${charges && `, ${say("charges")}`}</span>
           </li>
         `,
       )}
@@ -127,13 +127,8 @@ function Pads({ drones, told, marks }) {
   `;
 }
 
-function sharedWords({ drone, taken }) {
-  if (drone === undefined) return say("shared");
-  if (!drone) return say("shared, free");
-  return taken ? say("{name} stands here", { name: drone }) : say("kept for {name}", { name: drone });
-}
-
-function padWords(owner, isThere) {
-  if (!owner) return say("nobody’s home");
-  return isThere ? say("{name} stands here", { name: owner }) : say("home of {name}, which is away", { name: owner });
+function padWords(name, isThere, shared) {
+  if (!name) return shared ? say("shared, free") : say("nobody’s home");
+  if (isThere) return say("{name} stands here", { name });
+  return shared ? say("kept for {name}", { name }) : say("home of {name}, which is away", { name });
 }

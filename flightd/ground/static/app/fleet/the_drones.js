@@ -1,4 +1,4 @@
-// The drones of the station: how each is told from the others, by a letter in a shape and a colour of its own, where
+// The drones of the station: how each is told from the others, by letter, shape and colour, where
 // they are, as far as they tell, and whose pad is whose.
 import { isSilent } from "../hearing.js";
 import { html } from "../html.js";
@@ -49,12 +49,12 @@ export function placeOf({ known, floor }, told) {
   return x_m === undefined ? null : { x_m, y_m, yaw_rad: null, how: isThere && !old ? "stands" : "lost" };
 }
 
-// It is on a pad: for the station's traffic only where that is certain.
+// On a pad; by traffic only where that is certain.
 export const stands = (status, told) => (told ? told.rests : Boolean(status) && isGrounded(status) && status.phase !== "pilot" && status.phase !== "aborted");
 
 const padOf = (floor, at) => floor.pads.find((_, i) => nodesOf(floor)[i] === at);
 
-// The nodes of a floor's pads, found once.
+// Of pads, found once.
 const padNodes = new WeakMap();
 function nodesOf(floor) {
   if (!padNodes.has(floor)) padNodes.set(floor, floor.pads.map((pad) => nearest(pad, floor.nodes)));
@@ -66,7 +66,7 @@ function nearest(pad, nodes) {
   return nodes.reduce((best, node) => (!best || apart(node) < apart(best) ? node : best), null)?.id ?? "";
 }
 
-// The pads of a hall by their nodes: {node, owner, isThere, charges}; `owner` is empty where it is nobody's home.
+// The pads of a hall, by node: {owner (none: nobody’s), isThere, charges, shared}.
 export function padsOf(drones, told) {
   const pads = new Map();
   for (const { name, known: { status }, floor } of drones) {
@@ -74,8 +74,10 @@ export function padsOf(drones, told) {
       const node = nodesOf(floor)[i];
       const it = told?.drones?.[name];
       if (node === floor.home) pads.set(node, { node, owner: name, isThere: stands(status, it) && (it?.at ?? node) === node, charges: pad.charge });
-      else if (pad.shared) pads.set(node, { node, shared: told?.docks?.find((dock) => dock.node === node) ?? {}, charges: pad.charge });
-      else if (!pads.has(node)) pads.set(node, { node, owner: "" });
+      else if (!pads.has(node)) {
+        const shared = told?.docks?.find((dock) => dock.node === node);
+        pads.set(node, { node, owner: shared?.drone, isThere: shared?.taken, charges: shared, shared });
+      }
     }
   }
   return [...pads.values()].sort((a, b) => a.node.localeCompare(b.node));

@@ -134,7 +134,6 @@ export default {
   "Off the node, y": "Neben dem Knoten, y",
   "Missions may start here": "Missionen dürfen hier starten",
   "Batteries are charged or changed here": "Akkus werden hier geladen oder gewechselt",
-  "Drones land here only where they are sent": "Drohnen landen hier nur, wenn sie geschickt werden",
   "Found by": "Erkannt an",
   "its own mat": "eigener Matte",
   "the end of a painted line": "einem Linienende",

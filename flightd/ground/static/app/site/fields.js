@@ -60,7 +60,6 @@ export const FIELDS = {
     part("offset_m", english("Off the node, x"), 0), part("offset_m", english("Off the node, y"), 1),
     check("start", english("Missions may start here"), true),
     check("charge", english("Batteries are charged or changed here"), true),
-    check("shared", english("Drones land here only where they are sent"), false),
     choice("sign", english("Found by"), [["mat", english("its own mat")], ["line_end", english("the end of a painted line")]], "mat"),
   ],
   marker: [
