@@ -42,12 +42,12 @@ class HeldDrone(PaperDrone):
 class PaperLink:
     """`DroneLink` to a drone on paper, which is held at first."""
 
-    def __init__(self, name: str, _address: Address, pages: Pages) -> None:
+    def __init__(self, name: str, pages: Pages, docks: Sequence[str]) -> None:
         def tell(drone: str, topic: str, value: Any) -> None:
             pages.tell(drone, topic, {"cameras": (), **value} if topic == "welcome" else value)
 
         self.name = name
-        self.drone = HeldDrone(name, hall(name), tell)
+        self.drone = HeldDrone(name, hall(name, docks=docks), tell)
         self.on_plan: object = None
         self.attends_run = False
         self.is_reached = True
@@ -85,15 +85,16 @@ class PaperLink:
 class PaperStation:
     """Where it is, and its drones by their names."""
 
-    def __init__(self) -> None:
+    def __init__(self, docks: Sequence[str] = ()) -> None:
+        self._docks = docks
         self.url = ""
         self.links: dict[str, PaperLink] = {}
         self.own: OwnFleet | None = None
         self.ready = threading.Event()
         self.loop: asyncio.AbstractEventLoop | None = None
 
-    def link(self, name: str, address: Address, pages: Pages) -> PaperLink:
-        found = self.links[name] = PaperLink(name, address, pages)
+    def link(self, name: str, _address: Address, pages: Pages) -> PaperLink:
+        found = self.links[name] = PaperLink(name, pages, self._docks)
         return found
 
 
@@ -106,9 +107,10 @@ def paper_station(
     login: bool = False,
     speed: float = 1.0,
     store: GroundStore | None = None,
+    docks: Sequence[str] = (),
 ) -> Iterator[PaperStation]:
-    """It serves meanwhile; `fleet`: it flies its drones itself."""
-    station = PaperStation()
+    """It serves meanwhile; `fleet`: it flies its drones itself, which share the pads at `docks`."""
+    station = PaperStation(docks)
     ending: list[Callable[[], object]] = []
 
     async def serving() -> None:

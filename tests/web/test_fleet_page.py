@@ -67,6 +67,31 @@ def press(page: Page, name: str | re.Pattern[str]) -> None:
     page.get_by_role("button", name=name).press("Enter")
 
 
+def test_a_shared_pad_is_free_kept_for_a_drone_and_taken(browser: Browser, tmp_path: Path) -> None:
+    with (
+        paper_station("ab", tmp_path, docks=["A5"], speed=4.0) as station,
+        opened(browser, f"{station.url}/fleet") as page,
+    ):
+        pads = page.get_by_role("list", name="Pads").get_by_role("listitem")
+        shared = pads.filter(has_text="Pad A5:")
+        expect(shared).to_have_text("Pad A5: shared, free, charges")
+        a = station.links["a"].drone
+        a.battery_frac = 0.5
+        page.get_by_role("button", name="Node A3").click()
+        page.get_by_role("region", name="Work", exact=True).get_by_label("Flown by").select_option("a")
+        press(page, "Have 1 node visited")
+        a.held = False
+        own = station.own
+        assert own is not None
+        while own.document()["docks"][0]["drone"] != "a":
+            page.wait_for_timeout(50.0)
+        a.held = True
+        expect(shared).to_contain_text("kept for a, charges")
+        a.held = False
+        expect(shared).to_contain_text("a stands here, charges")
+        expect(pads.filter(has_text="Pad A1:")).to_contain_text("home of a, which is away")
+
+
 def test_a_tour_is_asked_for_a_drone_is_taken_and_given_back_and_all_are_stopped(
     browser: Browser, fleet: PaperStation
 ) -> None:
