@@ -460,7 +460,7 @@ class ManagedDrone:
                 self._sent.refused(text)
         newest = status if self._status is None else self._status
         self._did = act, asyncio.get_running_loop().time(), newest.seq + 2
-        detail = ", ".join(act.nodes) if isinstance(act, PlanNext) else ""
+        detail = ", ".join(act.nodes) if isinstance(act, PlanNext) else "onto its pad" if act.lands else ""
         self._write_down(f"{text} {detail}".rstrip(), refused)
 
     def _troubles(self) -> list[Error]:

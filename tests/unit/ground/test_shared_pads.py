@@ -4,9 +4,11 @@ another has or was promised."""
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 from flightd.core.types import Phase
+from flightd.ground.fleet.fleet_memory import FleetMemory
 from tests.rigs.paper_fleet import PaperFleet, fly, until
 
 DOCKS = ("A5",)
@@ -36,7 +38,7 @@ def test_who_is_low_after_its_tour_charges_on_the_shared_pad_and_flies_again_fro
         fleet.own.ask(["A3"], "a")
         await until(lambda: holder(fleet) == ("a", False), 100)
         await on_dock(fleet, "a")
-        assert "goto A5" in a.commands
+        assert ("goto A5 onto its pad", "a", "accepted", "") in fleet.written
         assert fleet.state["drones"]["a"]["charges_to"] == 0.8
         fleet.own.ask(["A4"], "a")
         await asyncio.sleep(30.0)
@@ -61,7 +63,9 @@ def test_two_that_are_low_never_come_to_one_pad() -> None:
         first, _ = holder(fleet)
         other = fleet.drones["b" if first == "a" else "a"]
         await until(lambda: other.phase is Phase.DONE, 200)
-        assert not any(command == "goto A5" for command in other.commands[-1:])
+        assert not any(
+            what.endswith("onto its pad") for what, name, *_ in fleet.written if name == other.name
+        )
         other.begin_anew()  # on its own pad, and still low
         await until(lambda: fleet.flown(other.name), 30)
         fleet.drones[first].charges_per_s = 0.02
@@ -111,14 +115,12 @@ def test_a_daemon_that_is_started_anew_on_a_shared_pad_is_flown_once_a_person_pu
         fleet.drones["b"].battery_frac = 0.5
         fleet.own.ask(["B3"], "b")
         await until(lambda: fleet.drones["b"].phase is Phase.DONE, 200)
-        assert "goto A5" not in fleet.drones["b"].commands
+        assert not any(what.endswith("onto its pad") for what, name, *_ in fleet.written if name == "b")
 
     fly(go, "ab", docks=DOCKS)
 
 
-def test_a_station_that_is_killed_knows_who_stands_where(tmp_path: Any) -> None:
-    from flightd.ground.fleet.fleet_memory import FleetMemory
-
+def test_a_station_that_is_killed_knows_who_stands_where(tmp_path: Path) -> None:
     async def go(fleet: PaperFleet) -> None:
         a, b = fleet.drones["a"], fleet.drones["b"]
         a.battery_frac = 0.5
