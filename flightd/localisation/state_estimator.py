@@ -35,7 +35,7 @@ _JITTERS, _MOST_JITTER_S = 2.0, 0.5
 """What comes from the vehicle jitters by so much in the mean; what goes there by as much again."""
 _ATTITUDE_LAG_S = 0.2
 """Of an attitude loop of 10 rad/s, for which the gains are."""
-_UNLEANT_S = 0.3
+_UNLEANT_S = 0.1
 """Over so long a push is averaged before it is leant against."""
 _MAP_SIGMA_M = 0.02
 """Of a distance between two lines of the map, as it is painted."""

@@ -33,6 +33,9 @@ _OFF_FLOOR_M = 0.5
 _RISES_UNSEEING_M, _RISES_UNSEEING_SHARE = 1.0, 0.65
 """So high, or so far up to its flying height, goes a take-off that has not seen any line of the map: nothing
 steers it, and it drifts by the square of the time."""
+_SWINGS_LAND_S = 12.0
+"""A drone that swings about its place, and does nothing worse, is held for so long: its loop has been slowed
+down, and corridor and push are judged by themselves."""
 _JUMPED = 2
 """So many attitudes with a senseless time are no stray datagram."""
 
@@ -101,7 +104,8 @@ class HazardMonitor:
             if self._debounce[trigger].step(holds, s.now_ns) >= tolerated_s and holds:
                 found.add(trigger)
         holding = found & _HOLDING_BUT_LINES
-        if self._trouble.step(bool(holding), s.now_ns) > self._params.lines_land_s:
+        lasts_s = _SWINGS_LAND_S if holding == {Trigger.SWINGS} else self._params.lines_land_s
+        if self._trouble.step(bool(holding), s.now_ns) > lasts_s:
             found.add(Trigger.HAZARD_LASTS)
         return found - {Trigger.LINES_FOUND} if holding else found
 
