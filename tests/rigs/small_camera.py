@@ -1,5 +1,5 @@
 """The simulated camera at half of what a flight with it costs, for flights that prove something else than
-what a picture shows: fewer pixels, fewer pictures; and no waiting on the pad or at a node."""
+what a picture shows: fewer pixels, fewer pictures; brisk, and without waiting on the pad."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ from pathlib import Path
 from typing import Final
 
 from flightd.sim.scenario.scenario import Scenario
+from tests.rigs.brisk import BRISK
 
 SMALL: Final[dict[str, float]] = {"width_px": 320, "height_px": 180, "fps": 20.0}
 
-AT_ONCE: Final = ("mission.autostart_countdown_s=0", "mission.dwell_s=0.5")
-"""Settings: the countdown and the dwell have tests of their own."""
+AT_ONCE: Final = (
+    "mission.autostart_countdown_s=0",
+    *(f"mission.{key}={value}" for key, value in BRISK.items()),
+)
+"""Settings: the countdown has tests of its own."""
 
 
 def at_once() -> list[str]:

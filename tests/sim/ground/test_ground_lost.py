@@ -14,10 +14,11 @@ from flightd.config.schema import load_config
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import Phase
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"dwell_s": 0.5})
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission=BRISK)
 SITE = load_site(CONFIGS / "site-demo.toml")
 LOST_S = 5.0
 

@@ -13,10 +13,11 @@ from flightd.sim.random_sites import random_site
 from flightd.site.layout import lay_out
 from flightd.site.site import Aisle, Pad, Site
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-CONFIG = load_config(CONFIGS / "sim.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission=BRISK)
 DEMO = load_site(CONFIGS / "site-demo.toml")
 UNIFORM = lay_out("uniform", [Aisle("A", 0.0, 0.0, (1.5,) * 6)], [], [Pad("home", "A4", 0.5)], ceiling_m=6.0)
 

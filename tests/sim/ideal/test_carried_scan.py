@@ -12,13 +12,14 @@ from flightd.core.inventory import LocationState
 from flightd.core.types import Phase
 from flightd.site.site import Site
 from flightd.site.site_file import parse_site
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.sim.ideal.test_carried import wrong_visits
 from tests.unit.mission.shelves import FITTED, SIGHT
 
 CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(
-    front_camera=FITTED, scan={"mode": ScanMode.STOP}
+    front_camera=FITTED, scan={"mode": ScanMode.STOP}, mission=BRISK
 )
 ALIKE = parse_site(
     """

@@ -19,12 +19,13 @@ from flightd.core.scanning import Finding
 from flightd.core.types import Command, CommandKind, EventLevel, Phase
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import FITTED, SIGHT, SITE
 
 CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(
-    front_camera=FITTED, scan={"mode": ScanMode.STOP}
+    front_camera=FITTED, scan={"mode": ScanMode.STOP}, mission=BRISK
 )
 NODES = ("A2", "A3")
 PLACES = [place.code for place in SITE.locations.values() if place.node in NODES]

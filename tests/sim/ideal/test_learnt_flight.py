@@ -17,10 +17,11 @@ from flightd.core.tracks import SensorEstimate
 from flightd.core.types import Phase
 from flightd.replay.log import read_log
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import IdealFlight
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-CONFIG = load_config(CONFIGS / "sim.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission=BRISK)
 SITE = load_site(CONFIGS / "site-demo.toml")
 TOLD_DEG = 1.5
 """The camera is configured to be rolled by this, and is not."""

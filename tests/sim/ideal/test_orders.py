@@ -13,11 +13,12 @@ from flightd.config.schema import load_config
 from flightd.core.tick import TickInput, TickOutput
 from flightd.core.types import Command, CommandKind, Demand, Phase
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
-CONFIG = load_config(CONFIGS / "sim.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission=BRISK)
 S = 50
 """Ticks in a second."""
 

@@ -14,10 +14,11 @@ from flightd.core.types import Command, CommandKind, Phase
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.battery_swapper import BatterySwapper
 from flightd.site.site_file import load_site, parse_site, site_toml
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-CONFIG = load_config(CONFIGS / "sim.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission=BRISK)
 DEMO = load_site(CONFIGS / "site-demo.toml")
 NEAR = ("A2", "A3")
 ROW = ("A2", "A3", "A4", "A5")
@@ -27,7 +28,7 @@ SMALL = AirframeParams(battery_capacity_ah=0.4)
 
 
 def config(battery: BatteryConfig = CONFIG.battery, **mission: object) -> Config:
-    return CONFIG.with_values(battery=battery, mission={"dwell_s": 0.5, **mission})
+    return CONFIG.with_values(battery=battery, mission=mission)
 
 
 def when(flight: IdealFlight, *script: tuple[Callable[[TickOutput], bool], CommandKind, str]) -> None:

@@ -12,10 +12,11 @@ from flightd.core.types import Phase
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.unknowns import Unknowns, WorldKind, unknowns_of
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight, rms_off_line
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-CONFIG = load_config(CONFIGS / "sim.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission=BRISK)
 SITE = load_site(CONFIGS / "site-demo.toml")
 
 

@@ -23,12 +23,13 @@ from flightd.site.site import Aisle, Marker, Pad
 from flightd.site.site_file import load_site
 from flightd.tracking.tilt_compensation import FloorView, ground_point
 from flightd.vision.line_detector import Detector
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import IdealFlight
 from tests.sim.ideal.test_carried import wrong_visits
 from tests.sim.world.test_renderer import hover
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-CONFIG = load_config(CONFIGS / "sim.toml")
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission=BRISK)
 DEMO = load_site(CONFIGS / "site-demo.toml")
 CAMERA = replace(SimCamera(), mount=Mount(math.pi / 2))
 LENS = CAMERA.lens
