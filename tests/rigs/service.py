@@ -6,6 +6,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 import multiprocessing
 import os
 import signal
@@ -14,7 +15,7 @@ import sys
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.adapters.vehicle.mavlink.link.codec import Codec
 from flightd.app.simulation.world_process import run_world
+from flightd.core.geometry import Mount
 from flightd.core.topics import Topic
 from flightd.replay.log import read_log
 from flightd.runtime.free_ports import free_ports
@@ -42,8 +44,10 @@ CAMERA = SimCamera(lens=wide_lens().scaled(320, 180), fps=20.0)
 class ServiceRig:
     """One world, and one daemon after the other in it.  `said` is what the daemons told the manager."""
 
-    def __init__(self, folder: Path, nodes: tuple[str, ...]) -> None:
+    def __init__(self, folder: Path, nodes: tuple[str, ...], *, fps: float = CAMERA.fps) -> None:
+        """A drone that only stands needs few pictures: with `fps` of 5 it costs half."""
         self.folder = folder
+        self._camera = replace(CAMERA, fps=fps)
         self.flights = folder / "flights"
         self.ports = free_ports(2)
         status_port, command_port = free_ports(2, socket.SOCK_STREAM)
@@ -58,7 +62,8 @@ class ServiceRig:
         self.process: asyncio.subprocess.Process | None = None
 
     def _toml(self, nodes: tuple[str, ...]) -> str:
-        lens = CAMERA.lens
+        camera = self._camera
+        lens = camera.lens
         sections: dict[str, dict[str, Any]] = {
             "mission": {
                 "site": str(SITE_FILE),
@@ -70,8 +75,8 @@ class ServiceRig:
             "camera": {
                 "url": f"udp://127.0.0.1:{self.ports[0]}",
                 "mount_yaw_deg": 90,
-                "fps": CAMERA.fps,
-                "latency_s": CAMERA.capture_delay_s,
+                "fps": camera.fps,
+                "latency_s": camera.capture_delay_s,
                 **{key: getattr(lens, key) for key in ("width_px", "height_px", "fx_px", "fy_px")},
                 **{key: getattr(lens, key) for key in ("cx_px", "cy_px")},
                 "distortion": list(lens.distortion),
@@ -102,7 +107,7 @@ class ServiceRig:
             camera_address=("127.0.0.1", self.ports[0]),
             vehicle_ports=(self.ports[1],),
             parameters=parameters,
-            camera=CAMERA.__class__(**_fields(CAMERA) | {"mount": _turned(CAMERA.mount)}),
+            camera=replace(self._camera, mount=_turned(self._camera.mount)),
         )
         log = self.folder / "truth.mcap"
         process = context.Process(target=run_world, args=(spec, 1.0, log, channel.theirs), name="world")
@@ -191,13 +196,9 @@ class ServiceRig:
         return [Kinematics(**{name: m[name] for name in names}) for m in messages if isinstance(m, dict)]
 
 
-def _fields(value: Any) -> dict[str, Any]:
-    return {field.name: getattr(value, field.name) for field in fields(value)}
-
-
-def _turned(mount: Any) -> Any:
+def _turned(mount: Mount) -> Mount:
     """The picture's long side along the nose, as in the shipped configuration of the simulator."""
-    return mount.__class__(**_fields(mount) | {"yaw_rad": 1.5707963267948966})
+    return replace(mount, yaw_rad=math.pi / 2.0)
 
 
 def _processes() -> list[int]:

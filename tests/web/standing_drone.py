@@ -19,7 +19,7 @@ class StandingDrone:
     """Its configuration's file and its ports; a parameter of its autopilot is wrong."""
 
     def __init__(self, folder: Path) -> None:
-        self.rig = ServiceRig(folder, ("A2",))
+        self.rig = ServiceRig(folder, ("A2",), fps=5.0)
         self.config = self.rig.config
         (folder / SITE_FILE.name).write_text(SITE_FILE.read_text())
         text = self.config.read_text().replace("autostart = true", "autostart = false  # by a person")

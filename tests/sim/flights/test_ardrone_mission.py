@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
+from tests.rigs.small_camera import at_once
+
 ROOT = Path(__file__).parents[3]
 
 
 def flown(folder: Path) -> dict[str, Any]:
-    brief = ["--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5"]
-    brief += ["--set", "mission.autostart_countdown_s=0"]
-    options = ["--json", "--out", str(folder), "--seed", "5", *brief]
+    options = ["--json", "--out", str(folder), "--seed", "5", "--set", 'mission.nodes=["A2"]', *at_once()]
     done = subprocess.run(
         [sys.executable, "-m", "flightd", "sim", "--vehicle", "ardrone", *options],
         cwd=ROOT,

@@ -19,12 +19,11 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement
 from tests.rigs.event_loops import real
-from tests.rigs.small_camera import small_camera_file
+from tests.rigs.small_camera import at_once, small_camera_file
 from tests.rigs.vehicles import Rig
 
 ROOT = Path(__file__).parents[3]
-AT_ONCE = ("--set", "mission.autostart_countdown_s=0")
-SHORT = ("--set", 'mission.nodes=["A2"]', "--set", "mission.dwell_s=0.5", *AT_ONCE)
+SHORT = ("--set", 'mission.nodes=["A2"]', *at_once())
 
 
 def flown(folder: Path, *options: str) -> dict[str, Any]:

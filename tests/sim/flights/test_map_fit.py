@@ -11,9 +11,8 @@ from flightd.core.topics import Document, Topic
 from flightd.replay.log import read_log
 from flightd.site.site_file import load_site, parse_site
 from tests.command import Command
-from tests.rigs.small_camera import small_camera_file
+from tests.rigs.small_camera import at_once, small_camera_file
 
-AT_ONCE = ("--set", "mission.autostart_countdown_s=0")
 DEMO = Path(__file__).parents[3] / "configs" / "site-demo.toml"
 
 
@@ -23,7 +22,7 @@ def test_lines_are_found_where_they_were_painted(flightd: Command, tmp_path: Pat
     off.write_text("[floor]\nmap_error_m = 0.10\n")
     flown = tmp_path / "flown"
     seen = ("--scenario", off, "--scenario", small_camera_file(tmp_path))
-    brief = ("--set", "mission.nodes=A2,A3", "--set", "mission.dwell_s=1", *AT_ONCE)
+    brief = ("--set", "mission.nodes=A2,A3", *at_once(), "--set", "mission.dwell_s=1")
     code, out, _ = flightd("sim", "--seed", 41, *seen, "--out", flown, *brief, "--json")
     assert (code, json.loads(out)["nodes_visited"]) == (0, 2)  # and safe it was
     truths = read_log(flown / "truth.mcap", {Topic.MAP}).messages(Document, Topic.MAP)

@@ -20,7 +20,7 @@ from tests.rigs.service import ServiceRig
 @pytest.mark.slow
 @in_real_time
 async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) -> None:
-    rig = ServiceRig(tmp_path, ("A2",))
+    rig = ServiceRig(tmp_path, ("A2",), fps=5.0)
     text = rig.config.read_text().replace("autostart = true", "autostart = false  # a person starts it")
     text = text.replace("[ground]", f'[ground]\naudit = "{tmp_path / "audit.jsonl"}"')
     rig.config.write_text(text)

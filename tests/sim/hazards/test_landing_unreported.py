@@ -73,7 +73,8 @@ def is_not_commanded_to_lean(flown: Flown) -> None:
 
 
 def test_one_that_is_never_disarmed_is_given_up_and_said_aloud() -> None:
-    flight = IdealFlight(SITE, CONFIG, visits=("A2",))
+    impatient = CONFIG.with_values(mission={"expert": {"phase_slack_s": 5.0}})
+    flight = IdealFlight(SITE, impatient, visits=("A2",))
     flight.faults.endless = True
     flown = flight.fly(600.0)
     assert flown.phase is Phase.ABORTED

@@ -22,7 +22,7 @@ from flightd.core.types import Phase
 from flightd.replay.log import read_log
 from flightd.sim.judge.verdict import SAFETY_KINDS
 from flightd.sim.scenario.scenario import Scenario
-from tests.rigs.small_camera import with_small_camera
+from tests.rigs.small_camera import AT_ONCE, with_small_camera
 
 _WATCHED_NS = 10_000_000_000
 
@@ -45,7 +45,9 @@ def flown_since(
 ) -> list[dict[str, float]]:
     """The true motion from two seconds after a fault on the leg along y = 0 began; nothing is unsafe."""
     scenario = with_small_camera(Scenario.model_validate({"fault": [{"at_x_m": 2.3, "at_y_m": 0.0} | fault]}))
-    simulation = prepare(SimOptions(seed=11), scenario, folder, lambda _: None, sweep_route=SHORT_ROUTE)
+    simulation = prepare(
+        SimOptions(seed=11, settings=AT_ONCE), scenario, folder, lambda _: None, sweep_route=SHORT_ROUTE
+    )
     try:
         fly(replace(simulation, observer=observer))
     except FlightInterruptedError:

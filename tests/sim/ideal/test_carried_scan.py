@@ -36,8 +36,8 @@ shelf_height_m = 2.4
 
 [[rack]]
 bay_width_m = 1.3
-levels_m = [0.9, 1.8]
-positions = 2
+levels_m = [0.9]
+positions = 3
 sides = ["left"]
 
 [[pad]]

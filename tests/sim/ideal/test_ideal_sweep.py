@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 from flightd.config.sweep import ScanMode
 from flightd.core.inventory import LocationState
 from flightd.core.types import Phase
-from tests.sim.ideal.ideal_flight import IdealFlight
+from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront
 from tests.sim.ideal.test_ideal_scan import (
     CONFIG,
@@ -38,13 +39,19 @@ class Lamp:
     async def run(self) -> None: ...
 
 
-def test_the_lamp_is_lit_while_shelves_are_looked_at_and_at_no_other_time() -> None:
+@cache
+def whole_flight() -> tuple[Flown, Lamp]:
+    """Past all shelves and home, by a lamp."""
     flight = IdealFlight(SITE, SWEEP, visits=NODES, seed=5, front=IdealFront(SITE, SIGHT, STOCK))
     flight.lamp = lamp = Lamp()
-    phases: list[Phase] = []
-    flight.on_tick = lambda phase, _: phases.append(phase)
     flown = flight.fly()
     assert flown.phase is Phase.DONE, flown.reason
+    return flown, lamp
+
+
+def test_the_lamp_is_lit_while_shelves_are_looked_at_and_at_no_other_time() -> None:
+    flown, lamp = whole_flight()
+    phases = [phase for phase, _ in flown.truth]
     assert len(lamp.told) == len(phases)
     lit = [phase for phase, on in zip(phases, lamp.told, strict=True) if on]
     assert Phase.FOLLOW in lit
@@ -54,9 +61,7 @@ def test_the_lamp_is_lit_while_shelves_are_looked_at_and_at_no_other_time() -> N
 
 
 def test_shelves_are_counted_in_passing_at_the_height_of_each_level_and_nose_to_them() -> None:
-    front = IdealFront(SITE, SIGHT, STOCK)
-    flown = IdealFlight(SITE, SWEEP, visits=NODES, seed=5, front=front).fly()
-    assert flown.phase is Phase.DONE, flown.reason
+    flown, _ = whole_flight()
     assert set(flown.visited) == set(NODES)
     found = findings(flown)
     assert {code: finding.state for code, finding in found.items()} == {
