@@ -25,6 +25,8 @@ CONFIGS = Path(__file__).parents[3] / "configs"
 CONFIG = load_config(CONFIGS / "sim.toml")
 SITE = load_site(CONFIGS / "site-demo.toml")
 BOTH = [ardupilot_rig, px4_rig]
+NEAREST = ("A1",)
+"""Over the pad: what a landing ends like does not depend on where the drone has been."""
 
 
 def landing_s(flown: Flown) -> float:
@@ -33,7 +35,7 @@ def landing_s(flown: Flown) -> float:
 
 @pytest.mark.parametrize("seed", range(1, 4))
 def test_down_and_still_it_leans_no_more_and_is_disarmed(seed: int) -> None:
-    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=seed, wind=WindParams(0.8, 0.5))
+    flight = IdealFlight(SITE, CONFIG, visits=NEAREST, seed=seed, wind=WindParams(0.8, 0.5))
     flight.faults.landing_unreported = True
     flown = flight.fly(120.0)
     assert flown.phase is Phase.DONE
@@ -50,7 +52,7 @@ def test_down_and_still_it_leans_no_more_and_is_disarmed(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_once_it_touches_it_is_not_commanded_to_lean_although_its_height_swings(seed: int) -> None:
-    flight = IdealFlight(SITE, CONFIG, visits=("A2",), seed=seed, wind=WindParams(0.8, 0.5))
+    flight = IdealFlight(SITE, CONFIG, visits=NEAREST, seed=seed, wind=WindParams(0.8, 0.5))
     flight.faults.landing_unreported = True
     readings = itertools.count()
 
@@ -74,7 +76,7 @@ def is_not_commanded_to_lean(flown: Flown) -> None:
 
 def test_one_that_is_never_disarmed_is_given_up_and_said_aloud() -> None:
     impatient = CONFIG.with_values(mission={"expert": {"phase_slack_s": 5.0}})
-    flight = IdealFlight(SITE, impatient, visits=("A2",))
+    flight = IdealFlight(SITE, impatient, visits=NEAREST)
     flight.faults.endless = True
     flown = flight.fly(600.0)
     assert flown.phase is Phase.ABORTED
