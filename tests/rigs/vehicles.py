@@ -100,7 +100,7 @@ class Rig:
             await self.stream(0.1, climb_mps=0.5)
         for name, value in self.patience.items():
             self.peer.parameters[name] = value
-        await self.stream(2.0)
+        await self.stream(1.0)
 
 
 async def _ended(tasks: list[asyncio.Task[None]]) -> None:
