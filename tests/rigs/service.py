@@ -34,6 +34,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.sim.world import WorldSpec
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 
 ROOT = Path(__file__).parents[2]
 SITE_FILE = ROOT / "configs" / "site-demo.toml"
@@ -70,7 +71,7 @@ class ServiceRig:
                 "nodes": list(nodes),
                 "autostart": True,
                 "autostart_countdown_s": 0.0,
-                "dwell_s": 0.5,
+                **BRISK,
             },
             "camera": {
                 "url": f"udp://127.0.0.1:{self.ports[0]}",

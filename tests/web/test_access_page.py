@@ -18,6 +18,7 @@ from flightd.config.schema import load_config
 from flightd.core.types import Phase
 from flightd.ground.messages import SessionState, session_message
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.rigs.certificates import make_certificate
 from tests.web.chromium import NARROW, WIDE, hindrances, new_context, opened, station
 from tests.web.live_flight import LiveFlight
@@ -32,7 +33,7 @@ from playwright.sync_api import expect
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
 CONFIG = load_config(CONFIGS / "sim.toml").with_values(
-    mission={"autostart": False, "start_countdown_s": 0.0}, ground={"lost_action": "land"}
+    mission={**BRISK, "autostart": False, "start_countdown_s": 0.0}, ground={"lost_action": "land"}
 )
 
 expect.set_options(timeout=40_000.0)

@@ -18,6 +18,7 @@ from flightd.ground.mqtt.broker_address import read_broker
 from flightd.ground.mqtt.fleet_link import FleetLink
 from flightd.ground.mqtt.managed_drone import OrderRules
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.rigs.broker import Mosquitto, mosquitto
 from tests.rigs.event_loops import real
 from tests.rigs.waiting import until
@@ -31,7 +32,7 @@ from tests.web.served import JSON, Station, served
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
 CONFIG = load_config(CONFIGS / "sim.toml").with_values(
-    mission={"autostart": False, "start_countdown_s": 0.0, "dwell_s": 1.0}
+    mission={**BRISK, "autostart": False, "start_countdown_s": 0.0, "dwell_s": 1.0}
 )
 RACKS = load_site(CONFIGS / "site-racks-small.toml")
 BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)

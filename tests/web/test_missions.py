@@ -19,6 +19,7 @@ from flightd.core.errors import InputError, RunError
 from flightd.ground.access.roles import Role
 from flightd.ground.missions.mission_book import FILE, Mission, MissionBook
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.rigs.event_loops import in_real_time
 from tests.web.live_flight import LiveFlight
 from tests.web.people_rig import audited, with_people
@@ -28,7 +29,7 @@ from tests.web.stock_rig import RACKS, counted_store, flown_log
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
 CONFIG = load_config(CONFIGS / "sim.toml").with_values(
-    mission={"autostart": False, "start_countdown_s": 0.0, "dwell_s": 0.2}
+    mission={**BRISK, "autostart": False, "start_countdown_s": 0.0, "dwell_s": 0.2}
 )
 NOBODY = ("demo", Address("127.0.0.1", 1, 1))
 ONE = Mission("mission-1", "demo", "Aisle A", ("A1", "A2"), (1,))

@@ -11,6 +11,7 @@ import pytest
 
 from flightd.config.schema import load_config
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.unit.mission.shelves import FITTED
 from tests.web.chromium import NARROW, hindrances, opened, station
 from tests.web.live_flight import LiveFlight
@@ -23,7 +24,7 @@ pytest.importorskip("playwright", reason="the tests of the page need playwright:
 from playwright.sync_api import expect
 
 CONFIG = load_config(Path(__file__).parents[2] / "configs" / "sim.toml").with_values(
-    mission={"autostart": False, "start_countdown_s": 0.0}, front_camera=FITTED
+    mission={**BRISK, "autostart": False, "start_countdown_s": 0.0}, front_camera=FITTED
 )
 DEMO = Path(__file__).parents[2] / "configs" / "site-demo.toml"
 SECOND = list(RACKS.nodes)[1]

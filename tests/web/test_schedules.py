@@ -16,6 +16,7 @@ from flightd.ground.access.roles import Role
 from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.schedules.night_shift import StationClock
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.rigs.event_loops import in_real_time
 from tests.web.live_flight import LiveFlight
 from tests.web.people_rig import audited, with_people
@@ -24,7 +25,7 @@ from tests.web.served import JSON, Station, served
 CONFIGS = Path(__file__).parents[2] / "configs"
 SITE = replace(load_site(CONFIGS / "site-demo.toml"), unattended_start=True)
 CONFIG = load_config(CONFIGS / "sim.toml").with_values(
-    mission={"autostart": False, "start_countdown_s": 0.0, "dwell_s": 0.2}
+    mission={**BRISK, "autostart": False, "start_countdown_s": 0.0, "dwell_s": 0.2}
 )
 NOBODY = ("demo", Address("127.0.0.1", 1, 1))
 TUESDAYS: Mapping[str, Any] = {

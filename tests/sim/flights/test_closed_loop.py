@@ -23,7 +23,7 @@ from flightd.core.types import Phase
 from flightd.sim.scenario.scenario import Scenario
 from tests.command import Command
 from tests.rigs.recorded_flight import fly_once
-from tests.rigs.small_camera import with_small_camera
+from tests.rigs.small_camera import AT_ONCE, with_small_camera
 
 ROOT = Path(__file__).parents[3]
 WALL = {"wall_time_s"}
@@ -106,8 +106,7 @@ def test_a_taken_camera_port_is_one_line(tmp_path: Path) -> None:
 
 def short_flight(folder: Path, speed: float, observer: Any) -> Simulation:
     scenario = with_small_camera(Scenario())
-    brief = 'mission.nodes=["A1", "A2"]', "mission.dwell_s=0.5", "mission.autostart_countdown_s=0"
-    settings = *brief, "vision.workers=2"
+    settings = 'mission.nodes=["A1", "A2"]', *AT_ONCE, "vision.workers=2"
     config, site = simulator_config(None, None, scenario, settings)
     return Simulation(config, site, scenario, 2, speed, folder, observer)
 
