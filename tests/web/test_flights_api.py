@@ -330,6 +330,8 @@ async def test_many_logs_do_not_hold_up_the_loop(folder: Path, tmp_path: Path) -
                 began_s = loop.time()
                 await asyncio.sleep(0.01)
                 held_s.append(loop.time() - began_s - 0.01)
+                if len(held_s) % 20:
+                    continue  # it is listening that is measured, not asking
                 told = json.loads((await station.ask("GET", "/api/flights?known=0"))[1])
                 if told["rows"] is not None and len(told["rows"]) == 150 and not told["unread"]:
                     break
