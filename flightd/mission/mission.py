@@ -406,7 +406,7 @@ class Mission:
         """What the phase that begins starts with."""
         match self.phase:
             case Phase.PREFLIGHT if trigger is Trigger.DOWN_AS_TOLD:
-                self._stand()
+                self._stand(s)
             case Phase.PREFLIGHT:
                 self._await_start()
             case Phase.TAKE_OFF:
@@ -427,11 +427,14 @@ class Mission:
                 text = f"found flying in mode {s.vehicle.mode} at {s.height_m:.1f} m: level, then landing"
                 self._events.report(s.now_ns, EventLevel.ERROR, "restart", text)
 
-    def _stand(self) -> None:
+    def _stand(self, s: MissionInputs) -> None:
         """On the pad that it was told: the next flight begins here, and somebody has to order it."""
         goal = self.goal
         self._steering.anchor = (goal.x_m, goal.y_m)
-        self._clearance.autostart = False
+        self._clearance.autostart = self._swapped = False
+        if self._scan.blind is not None:
+            self._events.report(s.now_ns, EventLevel.ERROR, "not_counted", in_words(self._scan.blind))
+        self._scan.count_anew()
         self._charging.begin_anew()
         self._route.begin(self._plan.begin_at(goal.node, goal.yaw_rad))
 

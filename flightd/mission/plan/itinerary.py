@@ -241,6 +241,8 @@ class Itinerary:
             holds = self.goal.waits
             ends = lands or (not waits and self.goal.node == node == self.waits_at)
             try:
+                if lands:  # its next flight leads home from there
+                    self._site.path(node, self._home)
                 self._replan([] if ends else [node], waits=waits, home=node if lands else None)
             except NoWayError as err:
                 why = f"goto {node} refused: {err}"

@@ -354,7 +354,7 @@ HAZARDS: tuple[Hazard, ...] = (
         " fifths of the one before, or two that grow: the position loop is too fast for what is late in it",
         Action.HOLD,
         "slowed down to 60 %, then to 36 %, tried faster again once after 8 s of calm; brake, hold; on when"
-        " it is over; land after 12 s of it alone, for gusts and a shaken camera keep even a slow loop moving",
+        " it is over; land after 12 s of it alone: gusts and a shaken camera keep even a slow loop moving",
         _FAST,
     ),
     Hazard(

@@ -48,6 +48,9 @@ class NoScan:
     def choose(self, levels: Sequence[int], *, by_stopping: bool = False) -> None:
         """Nothing is counted anyway."""
 
+    def count_anew(self) -> None:
+        """Nothing is counted anyway."""
+
     def skip(self, locations: Iterable[str]) -> None:
         """Nothing is counted anyway."""
 

@@ -157,6 +157,14 @@ class Scanner:
         """These need no look any more: an earlier flight of the same count has booked them."""
         self._done.update(self._planned.intersection(locations))
 
+    def count_anew(self) -> None:
+        """Whatever was counted until now needs another look in the next flight."""
+        self.leave()
+        self._done.clear()
+        self._swept.clear()
+        self._owners.clear()
+        self._begun = self._begun_blind = 0
+
     def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
         """Begin or continue the scan of a node that is reached."""
         self.leave()

@@ -46,6 +46,11 @@ class ShelfScan:
         """The nodes to fly to once more, as `Scanner.take_due`."""
         return self._scanner.take_due()
 
+    def count_anew(self) -> None:
+        """The next flight is another count."""
+        self._scanned = ""
+        self._scanner.count_anew()
+
     def drain_events(self) -> list[Event]:
         """What the scan has to report since the last call."""
         return self._scanner.drain_events()

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import pytest
 
+from flightd.config.scan import ScanConfig
 from flightd.core.errors import InputError
 from flightd.core.types import CommandKind, LandedState, Phase
+from flightd.mission.scan.scanner import Scanner
 from flightd.site.site import Pad
 from flightd.site.site_file import parse_site, site_toml
 from tests.unit.mission import shelves
@@ -99,3 +101,42 @@ def test_a_shared_pad_is_written_and_read_and_nobody_starts_there_at_first() -> 
     assert parse_site(text, "hall").pads == HALL.pads
     with pytest.raises(InputError, match=r"pad\[1\] \(dock\).shared: needs charge"):
         parse_site(text.replace("start = false\nshared", "shared"), "hall")
+
+
+def test_its_next_flight_counts_anew_what_an_earlier_one_has_counted() -> None:
+    scanner = Scanner(HALL, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=0.4, retakes=0))
+    flight = Flight(configured(dwell_s=0.5, autostart=False), HALL, scanner)
+    flight.run(0.2)
+    flight.order(PLAN, nodes=("A2",), waits=True)
+    start(flight)
+    flight.to(Phase.HOLD, 120.0)
+    scanner.skip(HALL.locations)
+    assert not scanner.wants("A2")
+    flight.order(GOTO, "A3", lands=True)
+    assert down(flight) is Phase.PREFLIGHT
+    assert scanner.wants("A2")
+
+
+def test_it_lands_nowhere_from_where_no_way_leads_home() -> None:
+    edges = (replace(edge, one_way=(edge.a, edge.b) == ("A2", "A3")) for edge in HALL.edges)
+    there = replace(HALL, edges=tuple(edges))
+    flight = Flight(configured(dwell_s=0.5, autostart=False), there)
+    flight.run(0.2)
+    flight.order(PLAN, nodes=("A2",), waits=True)
+    start(flight)
+    flight.to(Phase.HOLD, 120.0)
+    flight.order(GOTO, "A3", lands=True)
+    assert lands_at(flight) == there.home.node
+    assert any("goto A3 refused" in event.text for event in flight.mission.drain_events())
+
+
+def test_a_flight_that_saw_no_shelf_says_so_on_the_pad_that_it_was_told() -> None:
+    scanner = Scanner(HALL, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=0.4, retakes=0))
+    flight = Flight(configured(dwell_s=0.5, autostart=False), HALL, scanner)
+    flight.run(0.2)
+    flight.order(PLAN, nodes=("A2",), waits=True)
+    start(flight)
+    flight.to(Phase.HOLD, 240.0)
+    flight.order(GOTO, "A3", lands=True)
+    assert down(flight) is Phase.PREFLIGHT
+    assert [event.name for event in flight.mission.drain_events()].count("not_counted") == 1
