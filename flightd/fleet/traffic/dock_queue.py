@@ -218,7 +218,8 @@ class DockQueue:
         for drone, dock in chosen_docks(self._docks.values(), free_ms, waiting).items():
             holder = self._holder.get(dock.name)
             if holder is not None:
-                self._make_room(holder, dock, known, now_ms)
+                if left_ms.get(holder, 0) > 0:  # not one that nobody may send anywhere
+                    self._make_room(holder, dock, known, now_ms)
             elif not self._is_early(drone, now_ms):
                 self._next_try_ms[drone] = now_ms + _RETRY_MS
                 if self._fly_to(drone, dock, left_ms[drone], now_ms):

@@ -54,6 +54,10 @@ class DroneAir:
         self._told_stand = self.stand
         self._session = ""
         self._armed = self._flew = False
+        self._is_untold = False
+        """It waits on a pad, maybe a shared one, and has not told on which."""
+        self._given_back = False
+        """A person gave it back before it had told."""
         self._at: tuple[float, float] | None = None
         """Told last while armed: a drone on the ground tells none."""
 
@@ -87,8 +91,10 @@ class DroneAir:
         silent, and may fly what it was ordered."""
         if status is not None:
             self._told_stand = self._floor.stand(self._drone, stands_on)
+            self._is_untold = status.phase is Phase.PREFLIGHT and stands_on is None
             self._see_session(status, stood=stands_on is not None)
             self._see_flight(status)
+            self._see_given_back()
         if ordered:
             self.rests = False
 
@@ -124,6 +130,13 @@ class DroneAir:
         elif status.phase is Phase.PREFLIGHT and self.is_believed and self._stands_on_shared:
             self._rest(self._told_stand)
 
+    def _see_given_back(self) -> None:
+        """It rests where it tells to stand, as the person said."""
+        self._given_back &= not self._armed and not self.is_astray
+        if self._given_back and not self._is_untold:
+            self._given_back = False
+            self._rest(self._told_stand)
+
     @property
     def _stands_on_shared(self) -> bool:
         return self._told_stand != self._floor.pad(self._drone)
@@ -157,9 +170,12 @@ class DroneAir:
         return frozenset([self.place]).union(() if self._at is None else self._floor.around(self._at))
 
     def give_back(self) -> None:
-        """A person says that on the ground it stands on its pad, and in the air it is where it tells."""
+        """A person says that on the ground it stands on its pad, and in the air it is where it tells.  One
+        that has flown and waits on a pad is asked first on which."""
         self.is_astray = False
-        if not self._armed:
+        if not self._armed and self._flew and self._is_untold:
+            self._given_back = True
+        elif not self._armed:
             self._rest(self._told_stand)
         elif self.is_believed:
             self.begin()

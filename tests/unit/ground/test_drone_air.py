@@ -122,3 +122,18 @@ def test_who_is_silent_with_an_order_may_have_flown() -> None:
     air.see(GROUND, stands_on="B1", ordered=True)
     air.see(GROUND, stands_on="B1", ordered=False)
     assert air.rests, "in the same session, never armed"
+
+
+def test_who_is_given_back_before_it_tells_on_which_pad_it_came_down_is_asked_first() -> None:
+    docked = FleetFloor({name: floor_status(hall(name, docks=("A5",))) for name in PADS}, PADS, CellSize())
+    dock = docked.stand("b", "A5")
+    assert dock != docked.pad("b")
+    air = DroneAir("b", docked)
+    steps = [(GROUND, "B1"), (told(Phase.LAND), "B1"), (told(Phase.PREFLIGHT, armed=False), None)]
+    for status, stands_on in steps:
+        air.see(status, stands_on=stands_on, ordered=False)
+        air.close([], 0.0, pads=[dock])
+    air.give_back()
+    assert (air.rests, dock in air.closed) == (False, True)
+    air.see(told(Phase.PREFLIGHT, armed=False), stands_on="A5", ordered=False)
+    assert (air.rests, air.stand, air.place) == (True, dock, dock)

@@ -71,7 +71,7 @@ def test_two_that_are_low_never_come_to_one_pad() -> None:
         fleet.drones[first].charges_per_s = 0.02
         fleet.own.ask(["A4"], other.name)
         await until(lambda: fleet.drones[first].phase is Phase.DONE, 300)  # it made room
-        await until(lambda: holder(fleet) in {("", False), (other.name, True)}, 100)
+        await until(lambda: holder(fleet) == (other.name, True), 200)
 
     fly(go, "ab", docks=DOCKS)
 
@@ -86,6 +86,25 @@ def test_what_a_drone_chooses_by_itself_frees_the_pad_that_was_promised() -> Non
         await until(lambda: a.phase is Phase.DONE, 100)
         await until(lambda: holder(fleet) == ("", False), 20)
         assert a.stand == "A1"
+
+    fly(go, "ab", docks=DOCKS)
+
+
+def test_who_is_taken_on_its_way_down_and_given_back_there_still_has_the_pad() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        a.battery_frac = 0.5
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: a.phase is Phase.LAND, 200)
+        fleet.own.hand_over("a", to_manager=False)
+        await until(lambda: a.phase is Phase.PREFLIGHT and a.stand == "A5", 100)
+        await asyncio.sleep(2.0)
+        fleet.own.hand_over("a", to_manager=True)
+        b.battery_frac = 0.5
+        fleet.own.ask(["B3"], "b")
+        await until(lambda: b.phase is Phase.DONE, 300)
+        assert holder(fleet) == ("a", True)
+        assert not any(what.endswith("onto its pad") for what, name, *_ in fleet.written if name == "b")
 
     fly(go, "ab", docks=DOCKS)
 
