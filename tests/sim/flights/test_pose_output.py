@@ -14,7 +14,7 @@ from flightd.app.simulation.simulator_config import simulator_config
 from flightd.core.types import Phase
 from flightd.sim.autopilot.autopilot import AutopilotPeer
 from flightd.sim.scenario.scenario import Scenario
-from tests.rigs.small_camera import AT_ONCE, with_small_camera
+from tests.rigs.small_camera import with_small_camera
 
 
 @pytest.mark.slow
@@ -35,8 +35,9 @@ def test_a_flight_tells_its_motion_by_every_frame_and_the_pad_while_near(
 
     monkeypatch.setattr(AutopilotPeer, "received", listen)
     scenario = with_small_camera(Scenario())
+    mission = 'mission.nodes=["A2"]', "mission.dwell_s=0.5", "mission.autostart_countdown_s=0"
     vehicle = "vehicle.pose_output=odometry", "vehicle.landing_target=true"
-    config, site = simulator_config(None, None, scenario, ['mission.nodes=["A2"]', *AT_ONCE, *vehicle])
+    config, site = simulator_config(None, None, scenario, [*mission, *vehicle])
     result = simulate.fly(Simulation(config, site, scenario, 2, None, tmp_path, lambda _: None))
     assert result.phase is Phase.DONE
     poses, targets = heard["ODOMETRY"], heard["LANDING_TARGET"]
