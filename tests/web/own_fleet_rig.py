@@ -20,13 +20,12 @@ from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.mqtt.managed_drone import OrderRules
 from flightd.sim.fleet.judge import FleetJudge
 from flightd.sim.fleet.world import FleetDrone
-from tests.rigs.brisk import BRISK
 from tests.rigs.paper_drones import hall
 from tests.web.live_flight import LiveFlight
 from tests.web.served import JSON, Station, served
 
 CONFIG = load_config(Path(__file__).parents[2] / "configs" / "sim.toml").with_values(
-    mission={**BRISK, "autostart": False, "start_countdown_s": 0.0}
+    mission={"autostart": False, "start_countdown_s": 0.0, "dwell_s": 0.5}
 )
 _LOOK_S = 0.01
 _RESTS = frozenset({Phase.PREFLIGHT, Phase.HOLD, Phase.DONE})
