@@ -21,6 +21,8 @@ ASSUMED_CEILING_M = 2.5
 """The ceiling of a site whose file gives none: half a metre below it, at 2 m, nobody needs to measure one."""
 PAD_REACH_M = 0.5
 """A pad further than this from its place on the map is not taken for it."""
+SAME_NODE_M = 0.3
+"""A node that is so near where one was on another map is the same: a map may be measured anew."""
 
 
 class LineColour(enum.StrEnum):

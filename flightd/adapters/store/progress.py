@@ -10,14 +10,10 @@ import json
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
 
 from flightd.adapters.store.kept_file import KeptFile
 from flightd.core.errors import InputError
-from flightd.site.site import Site
-
-_SAME_M: Final = 0.3
-"""A node that is so near where it was is the same: a map may be measured anew."""
+from flightd.site.site import SAME_NODE_M, Site
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +43,7 @@ def load_left_over(path: Path, site: Site) -> LeftOver:
     if name != site.name or not {*left.remaining, left.stand} <= site.nodes.keys():
         raise InputError(f"{path}: progress on site {name}, not on {site.name}; start without --resume")
     known = [node for node in at if node in site.nodes]
-    if moved := [node for node in known if math.dist(_place(site, node), at[node]) > _SAME_M]:
+    if moved := [node for node in known if math.dist(_place(site, node), at[node]) > SAME_NODE_M]:
         raise InputError(
             f"{path}: {moved[0]} lies elsewhere on {site.name} than it did then; start without --resume"
         )

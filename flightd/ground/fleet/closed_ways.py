@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Final
 
 import msgspec
 
@@ -14,9 +13,7 @@ from flightd.core.errors import InputError
 from flightd.fleet.traffic.closures import Closure
 from flightd.ground.fleet.fleet_memory import FILE
 from flightd.ground.mqtt.linked_floor import node_of_pad, open_ways
-
-SAME_M: Final = 0.3
-"""A node that is so near where it was is the same: a map may be measured anew."""
+from flightd.site.site import SAME_NODE_M
 
 
 def aisle_closure(floor: FloorStatus, aisle: str) -> Closure:
@@ -66,7 +63,7 @@ def on_map(floor: FloorStatus, closure: Closure, places: Mapping[str, tuple[floa
 def _at(floor: FloorStatus, place: tuple[float, float]) -> str:
     """The node that is there; empty where none is."""
     nearest = min(floor.nodes, key=lambda node: math.dist((node.x_m, node.y_m), place))
-    return nearest.id if math.dist((nearest.x_m, nearest.y_m), place) <= SAME_M else ""
+    return nearest.id if math.dist((nearest.x_m, nearest.y_m), place) <= SAME_NODE_M else ""
 
 
 def _neighbours(floor: FloorStatus) -> Mapping[str, set[str]]:

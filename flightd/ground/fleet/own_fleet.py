@@ -20,7 +20,7 @@ from flightd.fleet.traffic.work_queue import WorkQueue
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.fleet.base_orders import VERSION
-from flightd.ground.fleet.closed_ways import SAME_M, aisle_closure, closure_between
+from flightd.ground.fleet.closed_ways import aisle_closure, closure_between
 from flightd.ground.fleet.closure_book import ClosureBook
 from flightd.ground.fleet.fleet_drone import FleetDrone
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor, with_all_pads
@@ -32,6 +32,7 @@ from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.ground.mqtt.safe_return import Standing
 from flightd.ground.mqtt.vehicle_sides import VehicleSides
 from flightd.mission.plan.leg_times import Pace
+from flightd.site.site import SAME_NODE_M
 
 TRAFFIC: Final = Identity("fleet traffic", Role.OPERATOR, "local")
 """Whose orders they are, in the audit."""
@@ -298,7 +299,7 @@ class OwnFleet(VehicleSides):
         was = {node.id: (node.x_m, node.y_m) for node in before.nodes}
         wanted = {*self._queue.open, *self._queue.given} & was.keys()
         for node in after.nodes:
-            if node.id in wanted and math.dist((node.x_m, node.y_m), was[node.id]) > SAME_M:
+            if node.id in wanted and math.dist((node.x_m, node.y_m), was[node.id]) > SAME_NODE_M:
                 self._queue.give_up(node.id, "the drones' map has it no more")
 
     # what is asked of it

@@ -113,9 +113,9 @@ class ScanTask:
         """The view cannot be reached, and after the second one none is flown to any more.  The locations that
         were to be looked at; they are decided as far as they were seen."""
         self._missed += 1
-        given_up = len(self._views) if self._missed >= _GIVES_UP else min(len(self._views), 1)
+        given_up = self._views[: None if self._missed >= _GIVES_UP else 1]
         missed: tuple[str, ...] = ()
-        for view in self._views[:given_up]:
+        for view in given_up:
             left = self._left(view)
             missed += left
             self._end(left)

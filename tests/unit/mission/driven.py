@@ -131,6 +131,13 @@ class Flight:
         self.run(within_s, lambda: self.phase is phase)
         assert self.phase is phase, self.mission.reason
 
+    def land(self) -> Phase:
+        """It comes down and stands disarmed; what became of it."""
+        self.to(Phase.LAND, 120.0)
+        self.set(landed=LandedState.ON_GROUND, armed=False)
+        self.run(0.02, follow=False)
+        return self.phase
+
     def order(
         self,
         kind: CommandKind,

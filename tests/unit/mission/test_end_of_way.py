@@ -7,7 +7,7 @@ import pytest
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
-from flightd.core.types import CommandKind, EventLevel, LandedState, Phase
+from flightd.core.types import CommandKind, EventLevel, Phase
 from tests.unit.mission import shelves
 from tests.unit.mission.driven import Flight
 from tests.unit.mission.states import PARAMS, flight_of, losing, start
@@ -24,14 +24,6 @@ def flown(*nodes: str, params: Config = PARAMS, scans: bool = False) -> Flight:
     flight.to(Phase.HOLD, 120.0)
     assert flight.mission.goal.node == nodes[-1]
     return flight
-
-
-def down(flight: Flight) -> Phase:
-    """It has landed; what became of it."""
-    flight.to(Phase.LAND, 120.0)
-    flight.set(landed=LandedState.ON_GROUND, armed=False)
-    flight.run(0.02, follow=False)
-    return flight.phase
 
 
 def phases(flight: Flight) -> list[str]:
@@ -78,21 +70,21 @@ def test_an_order_to_fly_home_from_where_it_holds_ends_the_flight_as_done() -> N
     flight = flown("A2", "A1")
     flight.order(GOTO, "A1")
     assert flight.mission.outlook(flight.now_ns).waits_at == ""
-    assert down(flight) is Phase.DONE
+    assert flight.land() is Phase.DONE
     assert list(flight.mission.visited) == ["A2", "A1"], "nothing twice"
 
 
 def test_an_order_without_waiting_leads_home_as_ever() -> None:
     flight = flown("A2")
     flight.order(GOTO, "A3")
-    assert down(flight) is Phase.DONE
+    assert flight.land() is Phase.DONE
     assert list(flight.mission.visited) == ["A2", "A3"]
     again = flight_of(PARAMS)
     again.order(PLAN, nodes=("A2",))
     start(again)
     again.to(Phase.FOLLOW)
     again.order(GOTO, "A2")
-    assert down(again) is Phase.DONE
+    assert again.land() is Phase.DONE
     assert list(again.mission.visited) == ["A2", "A2"], "the same once more, as ordered"
 
 
@@ -122,7 +114,7 @@ def test_a_fresh_battery_flies_the_rest_and_waits_at_its_end() -> None:
     flight.to(Phase.HOVER)
     flight.to(Phase.FOLLOW)
     flight.set(battery_frac=0.15)
-    assert down(flight) is Phase.SWAP
+    assert flight.land() is Phase.SWAP
     start(flight)
     flight.to(Phase.HOLD, 120.0)
     assert (flight.mission.goal.node, list(flight.mission.visited)) == ("A3", ["A2", "A3"])

@@ -131,9 +131,7 @@ def test_a_command_that_is_not_possible_is_refused_and_changes_nothing(
 
 def down(flight: Flight) -> str:
     """It stands on the pad that it was led to and disarms; the state then."""
-    flight.to(Phase.LAND, 120.0)
-    flight.set(landed=LandedState.ON_GROUND, armed=False)
-    flight.run(0.02, follow=False)
+    flight.land()
     return ids(flight.mission.state)
 
 

@@ -9,9 +9,10 @@ import pytest
 
 from flightd.config.scan import ScanConfig
 from flightd.core.errors import InputError
-from flightd.core.types import CommandKind, LandedState, Phase
+from flightd.core.types import CommandKind, Phase
+from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
-from flightd.site.site import Pad
+from flightd.site.site import Pad, Site
 from flightd.site.site_file import parse_site, site_toml
 from tests.unit.mission import shelves
 from tests.unit.mission.configured import configured
@@ -23,9 +24,9 @@ DOCK = Pad("dock", "A3", 0.5, start=False, shared=True)
 HALL = replace(shelves.SITE, pads=(*shelves.SITE.pads, DOCK))
 
 
-def flown() -> Flight:
+def flown(site: Site = HALL, scanner: AnyScanner = NO_SCAN) -> Flight:
     """A flight that holds over A2."""
-    flight = Flight(configured(dwell_s=0.5, autostart=False), HALL)
+    flight = Flight(configured(dwell_s=0.5, autostart=False), site, scanner)
     flight.run(0.2)
     flight.order(PLAN, nodes=("A2",), waits=True)
     start(flight)
@@ -33,12 +34,9 @@ def flown() -> Flight:
     return flight
 
 
-def down(flight: Flight) -> Phase:
-    """It has landed; what became of it."""
-    flight.to(Phase.LAND, 120.0)
-    flight.set(landed=LandedState.ON_GROUND, armed=False)
-    flight.run(0.02, follow=False)
-    return flight.phase
+def unseeing() -> Scanner:
+    """A scanner that never gets a picture."""
+    return Scanner(HALL, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=0.4, retakes=0))
 
 
 def lands_at(flight: Flight) -> str:
@@ -50,7 +48,7 @@ def test_it_waits_on_the_pad_that_it_was_told_and_flies_on_from_there() -> None:
     assert lands_at(flight) == HALL.home.node
     flight.order(GOTO, "A3", lands=True)
     assert lands_at(flight) == "A3"
-    assert down(flight) is Phase.PREFLIGHT
+    assert flight.land() is Phase.PREFLIGHT
     assert flight.mission.stand[0] == "A3"
     flight.run(30.0)
     assert flight.phase is Phase.PREFLIGHT, "nobody ordered another flight"
@@ -61,7 +59,7 @@ def test_it_waits_on_the_pad_that_it_was_told_and_flies_on_from_there() -> None:
     flight.to(Phase.HOLD, 120.0)
     flight.order(HOME)
     assert lands_at(flight) == HALL.home.node
-    assert down(flight) is Phase.ABORTED
+    assert flight.land() is Phase.ABORTED
 
 
 def test_where_it_holds_already_it_comes_down() -> None:
@@ -70,7 +68,7 @@ def test_where_it_holds_already_it_comes_down() -> None:
     flight.to(Phase.FOLLOW)
     flight.to(Phase.HOLD, 120.0)
     flight.order(GOTO, "A3", lands=True)
-    assert down(flight) is Phase.PREFLIGHT
+    assert flight.land() is Phase.PREFLIGHT
     assert flight.mission.stand[0] == "A3"
 
 
@@ -87,7 +85,7 @@ def test_what_turns_it_from_there_brings_it_home(what: str) -> None:
     else:
         flight.order(GOTO, "A2")
     assert lands_at(flight) == HALL.home.node
-    assert down(flight) in {Phase.ABORTED, Phase.DONE}
+    assert flight.land() in {Phase.ABORTED, Phase.DONE}
 
 
 def test_by_itself_it_never_turns_to_a_pad_that_is_shared() -> None:
@@ -104,39 +102,26 @@ def test_a_shared_pad_is_written_and_read_and_nobody_starts_there_at_first() -> 
 
 
 def test_its_next_flight_counts_anew_what_an_earlier_one_has_counted() -> None:
-    scanner = Scanner(HALL, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=0.4, retakes=0))
-    flight = Flight(configured(dwell_s=0.5, autostart=False), HALL, scanner)
-    flight.run(0.2)
-    flight.order(PLAN, nodes=("A2",), waits=True)
-    start(flight)
-    flight.to(Phase.HOLD, 120.0)
+    scanner = unseeing()
+    flight = flown(scanner=scanner)
     scanner.skip(HALL.locations)
     assert not scanner.wants("A2")
     flight.order(GOTO, "A3", lands=True)
-    assert down(flight) is Phase.PREFLIGHT
+    assert flight.land() is Phase.PREFLIGHT
     assert scanner.wants("A2")
 
 
 def test_it_lands_nowhere_from_where_no_way_leads_home() -> None:
     edges = (replace(edge, one_way=(edge.a, edge.b) == ("A2", "A3")) for edge in HALL.edges)
     there = replace(HALL, edges=tuple(edges))
-    flight = Flight(configured(dwell_s=0.5, autostart=False), there)
-    flight.run(0.2)
-    flight.order(PLAN, nodes=("A2",), waits=True)
-    start(flight)
-    flight.to(Phase.HOLD, 120.0)
+    flight = flown(there)
     flight.order(GOTO, "A3", lands=True)
     assert lands_at(flight) == there.home.node
     assert any("goto A3 refused" in event.text for event in flight.mission.drain_events())
 
 
 def test_a_flight_that_saw_no_shelf_says_so_on_the_pad_that_it_was_told() -> None:
-    scanner = Scanner(HALL, shelves.SIGHT, ScanConfig(max_height_m=4.0, view_s=0.4, retakes=0))
-    flight = Flight(configured(dwell_s=0.5, autostart=False), HALL, scanner)
-    flight.run(0.2)
-    flight.order(PLAN, nodes=("A2",), waits=True)
-    start(flight)
-    flight.to(Phase.HOLD, 240.0)
+    flight = flown(scanner=unseeing())
     flight.order(GOTO, "A3", lands=True)
-    assert down(flight) is Phase.PREFLIGHT
+    assert flight.land() is Phase.PREFLIGHT
     assert [event.name for event in flight.mission.drain_events()].count("not_counted") == 1
