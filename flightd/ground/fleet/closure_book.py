@@ -29,10 +29,15 @@ class ClosureBook:
         self._closed: dict[str, KeptClosure] = {}
         self._changes = asyncio.Lock()
         self._is_recalled = False
+        self._mapped: tuple[FloorStatus, tuple[KeptClosure, ...], tuple[Closure, ...]] | None = None
 
     def on(self, floor: FloorStatus) -> tuple[Closure, ...]:
         """All that is closed now, as this map calls it.  InputError where it is not there."""
-        return tuple(on_map(floor, one.closure, one.places) for one in self._closed.values())
+        kept, mapped = tuple(self._closed.values()), self._mapped
+        if mapped is None or mapped[0] is not floor or mapped[1] != kept:  # traffic asks at every step
+            mapped = floor, kept, tuple(on_map(floor, one.closure, one.places) for one in kept)
+            self._mapped = mapped
+        return mapped[2]
 
     async def recall(self) -> None:
         """Read what is kept, once.  UnavailableError or InputError where that cannot be read: then nobody

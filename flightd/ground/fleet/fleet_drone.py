@@ -86,8 +86,7 @@ class FleetDrone:
         self._paused, self._was_taken = drone.vehicle.is_paused, False
         self._called_off_s = -math.inf
         self._stands_since_s = 0.0
-        stands_on = None if drone.standing is None else drone.standing.node
-        self.air = DroneAir(name, floor, stands_on)
+        self.air = DroneAir(name, floor, drone.stands_on)
         self._levels = sorted({level for node in floor.nodes for level in node.levels})
         self._sides = {(rack.aisle, rack.side) for rack in floor.racks}
         self._faces = {node.id: node.aisle for node in floor.nodes if node.levels}
@@ -241,8 +240,7 @@ class FleetDrone:
             self.air.give_back()
         ordered = not drone.is_heard and bool(self._base or drone.vehicle.ahead)
         was_astray = self.air.is_astray
-        stands_on = None if drone.standing is None else drone.standing.node
-        self.air.see(drone.status, stands_on=stands_on, ordered=ordered)
+        self.air.see(drone.status, stands_on=drone.stands_on, ordered=ordered)
         if self.air.is_astray and not was_astray:
             drone.taken_by_person()  # it lies where it is until he gives it back
         self._was_taken = drone.is_taken
@@ -255,8 +253,8 @@ class FleetDrone:
         if floor is None or (floor is self._checked[0] and standing is self._checked[1]):
             return
         self._checked = told
-        stands_on = None if standing is None else standing.node
-        before, self.objection = self.objection, self._floor.objection(self.name, floor, stands_on)
+        objection = self._floor.objection(self.name, floor, self.drone.stands_on)
+        before, self.objection = self.objection, objection
         if self.objection and self.objection != before:
             _LOG.warning("%s is not flown: %s", self.name, self.objection)
 

@@ -175,6 +175,11 @@ class ManagedDrone:
         return self._status
 
     @property
+    def stands_on(self) -> str | None:
+        """The node of the pad on which it says to stand; None where it has not told."""
+        return None if self._standing is None else self._standing.node
+
+    @property
     def standing(self) -> Standing | None:
         """What it told of itself before its start."""
         return self._standing
@@ -290,14 +295,13 @@ class ManagedDrone:
             self._standing, self._return = None, SafeReturn()
         arrived = self._arrived(status)
         asked = [self._asked.popleft() for _ in range(len(self._asked))]
-        stands_on = None if self._standing is None else self._standing.node
         if self._before.flies_on and status.plan.startswith(_OURS) and status.plan not in self._plans:
             # handed over after the station before wrote down for the last time
             self._plans.append(status.plan)
         mode = OperatingMode.MANUAL if self._is_new else self._mode(status)
         self._is_new = False
         last, floor = self.vehicle.last_node, self._welcome["floor"]
-        seen = situation_of(status, floor, mode, last, stands_on, self._troubles())
+        seen = situation_of(status, floor, mode, last, self.stands_on, self._troubles())
         for one in self.vehicle.step(self.now(), [seen, *arrived, *asked]):
             self._take_output(one, status)
         self._ahead = list(self.vehicle.ahead)
