@@ -45,7 +45,7 @@ class SensorPriors(Section):
     mount_yaw_deg: float = Field(2.0, gt=0, le=20, description="error of its yaw there")
     delay_s: float = Field(0.03, gt=0, le=0.5, description="error of camera.latency_s")
     scale_share: float = Field(
-        0.02, gt=0, le=0.5, description="error of focal length and height", json_schema_extra=unit("share")
+        0.03, gt=0, le=0.5, description="error of the focal length", json_schema_extra=unit("share")
     )
     heading_degps: float = Field(0.1, gt=0, le=5, description="drift of the vehicle's heading")
     shake_deg: float = Field(0.15, gt=0, le=5, description="picture against attitude, frame by frame")

@@ -9,7 +9,7 @@ forward * sin(theta) = rho, so a level, unrotated camera's line keeps its theta 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -100,6 +100,10 @@ class Lens:
 
     def matrix(self) -> Matrix:
         return np.array([[self.fx_px, 0.0, self.cx_px], [0.0, self.fy_px, self.cy_px], [0.0, 0.0, 1.0]])
+
+    def longer_by(self, factor: float) -> Lens:
+        """The same lens with a focal length that is that many times as long."""
+        return replace(self, fx_px=self.fx_px * factor, fy_px=self.fy_px * factor)
 
     def scaled(self, width_px: int, height_px: int) -> Lens:
         """The same lens read out at another resolution of the same field of view."""

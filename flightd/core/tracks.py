@@ -82,7 +82,7 @@ class SensorEstimate:
 
     Frames are exposed `delay_s` later than their stamps say: the camera's delay is that much shorter than
     configured, against the attitude's.  The camera sits rolled, pitched and turned by `mount` more than
-    configured, the told roll and pitch are too small by `tilt`, lengths are longer by `scale_share`.
+    configured, the told roll and pitch are too small by `tilt`, its focal length is shorter by `scale_share`.
     `shake_rad` is what the picture shakes against the attitude from frame to frame (rms)."""
 
     delay_s: float = math.nan

@@ -69,7 +69,7 @@ def offset_error(sight: LineSight, line: int, x: Matrix, rates: Rates) -> tuple[
     row = placed(sight, x, rates)
     row[column] = -1.0
     # as held, not as seen: what is seen has the noise in it that is weighed here, and scale would shrink
-    row[SCALE] = row[HEIGHT] = x[column]
+    row[SCALE], row[HEIGHT] = x[column] - sight.axis_m, x[column]
     return row, sight.offset_m - float(x[column])
 
 
@@ -83,5 +83,5 @@ def placed(sight: LineSight, x: Matrix, rates: Rates) -> Matrix:
     row[PSI] = by_yaw
     turning = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + by_yaw * rates.yaw_radps
     row[DELAY] = turning + x[VELOCITY[sight.axis]]
-    row[SCALE] = row[HEIGHT] = sight.offset_m
+    row[SCALE], row[HEIGHT] = sight.offset_m - sight.axis_m, sight.offset_m
     return row

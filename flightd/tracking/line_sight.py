@@ -42,6 +42,9 @@ class LineSight(NamedTuple):
     """What it makes of it beyond the height times the tilt."""
     turned_rad: float = 0.0
     """What it makes of the direction."""
+    axis_m: float = 0.0
+    """How far beyond the point below the drone the camera looks, along that axis: a shorter focal length
+    moves all that is seen away from there."""
 
 
 class FeatureSight(NamedTuple):
@@ -122,6 +125,7 @@ def line_sight(
         turn_per_mount=(turn_by_roll, turn_by_pitch + turned_by_mount),
         offset_per_mount_yaw=by_mount_yaw,
         tilted_m=tilted_m,
+        axis_m=on(across, middle) - on(across, turned),
         bent_m=bent_m,
         turned_rad=turned_rad,
     )
@@ -147,7 +151,7 @@ def feature_sight(
     turned = _untilted(point, tilt_rad, mount_tilt_rad, height_m)
     turned_x_m, turned_y_m = (axis[0] * turned[0] + axis[1] * turned[1] for axis in to_axis)
 
-    def across(axis: int, offset_m: float, by_yaw: float, by_mount_yaw: float) -> LineSight:
+    def across(axis: int, offset_m: float, turned_m: float, by_yaw: float, by_mount_yaw: float) -> LineSight:
         by_roll, by_pitch = (to_axis[axis][0] * shift[0] + to_axis[axis][1] * shift[1] for shift in shifts)
         by_roll += by_yaw * turned_by_roll
         return LineSight(
@@ -165,10 +169,12 @@ def feature_sight(
             offset_per_mount=(by_roll, by_pitch + by_yaw * turned_by_mount),
             turn_per_mount=_LEVEL,
             offset_per_mount_yaw=by_mount_yaw,
+            axis_m=offset_m - turned_m,
             feature=id_,
         )
 
-    return FeatureSight(id_, (across(0, x_m, -y_m, -turned_y_m), across(1, y_m, x_m, turned_x_m)))
+    by_x, by_y = across(0, x_m, turned_x_m, -y_m, -turned_y_m), across(1, y_m, turned_y_m, x_m, turned_x_m)
+    return FeatureSight(id_, (by_x, by_y))
 
 
 def _untilted(
@@ -194,7 +200,7 @@ def as_compensated(sight: LineSight, compensation: TiltCompensation) -> LineSigh
             left_m = sight.bent_m
         case TiltCompensation.NONE:
             left_m = sight.tilted_m
-            sight = sight._replace(offset_per_tilt=_LEVEL)
+            sight = sight._replace(offset_per_tilt=_LEVEL, axis_m=0.0)
     return sight._replace(
         sigma_m=math.hypot(sight.sigma_m, left_m),
         sigma_theta_rad=math.hypot(sight.sigma_theta_rad, sight.turned_rad),

@@ -136,7 +136,7 @@ class LineTracker:
 
     @property
     def scale_share(self) -> float:
-        """By how much lengths on the floor are longer than height and focal length make them, as a share."""
+        """By which share the focal length is shorter than configured, or the height told too small."""
         return self._filter.mean(SCALE)
 
     @property
@@ -196,10 +196,9 @@ class LineTracker:
         if attitude is None or not self._headed or lines.stamp_ns <= self._told_ns:
             self.rejected += 1
             return False
-        view = self._view(attitude, stamp_ns, height_m)
+        view = replace(self._view(attitude, stamp_ns, height_m), lens=self._lens)
         by_width_m = heights_by_width(lines.lines, view, self._line_width_m)
-        longer = self._filter.mean(SCALE) + self._filter.mean(HEIGHT)
-        height_m = self._widths.believed_m(by_width_m, height_m) * (1.0 + longer)
+        height_m = self._widths.believed_m(by_width_m, height_m) * (1.0 + self._filter.mean(HEIGHT))
         if not height_m > 0:
             self.rejected += 1
             return False
@@ -421,7 +420,8 @@ class LineTracker:
         if self._history.is_assumed(stamp_ns):
             sigma_tilt_rad = _ASSUMED_TILT_RAD
         mount, corrected = self._corrected_mount(), self._corrected(attitude)
-        return FloorView(self._lens, mount, corrected, height_m, self._compensation, sigma_tilt_rad)
+        lens = self._lens.longer_by(1.0 / (1.0 + self._filter.mean(SCALE)))
+        return FloorView(lens, mount, corrected, height_m, self._compensation, sigma_tilt_rad)
 
     def _corrected(self, told: Attitude) -> Attitude:
         """The attitude, by what has been learnt of it."""

@@ -5,7 +5,7 @@ The state is
 
     heading offset and its drift | velocity, disturbance of both grid axes | error of the told height
     | error of the told attitude | rate of its leak | mount of the camera | delay of its frames
-    | scale of lengths | offsets of all lines and features of the floor held
+    | share by which its focal length is shorter | offsets of all lines and features of the floor held
 
 Lines and features stand still, so all of them move with the one velocity; the control input is the
 acceleration that the attitude makes, g tan(tilt).  An autopilot without a position takes what its

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import pytest
@@ -34,6 +35,8 @@ class Truth:
     mount_pitch_deg: float = 0.0
     told_roll_deg: float = 0.0
     leak_per_s: float = 0.0
+    focal_share: float = 1.0
+    """The focal length as a share of the configured one."""
 
 
 def swung(waves: tuple[tuple[float, float, float], ...], t: float) -> tuple[float, float, float]:
@@ -53,11 +56,14 @@ def swinging(t: float) -> Kinematics:
     return Kinematics(at, node.x_m + x, node.y_m + y, HEIGHT_M, vx, vy, 0.0, roll, pitch, 0.0, 0.0, 0.0, 0.0)
 
 
-def told(truth: Truth, seed: int, seconds: float = 20.0) -> SensorEstimate:
-    """What the tracker says after so long."""
+def told(
+    truth: Truth, seed: int, seconds: float = 20.0, look: Callable[[LineTracker, float], None] | None = None
+) -> SensorEstimate:
+    """What the tracker says after so long; `look` sees it, and the time, after each frame."""
     tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0)
     turned = map(math.radians, (truth.mount_roll_deg, truth.mount_pitch_deg))
-    eye = IdealEye(SITE, LENS, Mount(0.0, (0.0, 0.0, 0.0), *turned), EyeErrors(), seed)
+    lens = LENS.longer_by(truth.focal_share)
+    eye = IdealEye(SITE, lens, Mount(0.0, (0.0, 0.0, 0.0), *turned), EyeErrors(), seed)
     waiting = []
     frame_s = 0.0
     leaked_roll = leaked_pitch = 0.0
@@ -73,6 +79,8 @@ def told(truth: Truth, seed: int, seconds: float = 20.0) -> SensorEstimate:
             waiting.append((t + ARRIVES_S, eye.see(k, n, round((t - truth.delay_s) * 1e9))))
         while waiting and waiting[0][0] <= t:
             tracker.frame(waiting.pop(0)[1], HEIGHT_M)
+            if look is not None:
+                look(tracker, t)
     tracks = tracker.at(round(seconds * 1e9))
     assert tracks is not None
     assert tracks.sensors.is_known
@@ -104,3 +112,25 @@ def test_a_wrong_attitude_is_found_with_the_mount() -> None:
     sensors = told(Truth(mount_roll_deg=1.0, told_roll_deg=0.5), 1)
     roll = math.degrees(sensors.mount_roll_rad + sensors.tilt_roll_rad)
     assert roll == pytest.approx(1.5, abs=0.2)
+
+
+@pytest.mark.parametrize("focal_share", [0.96, 1.04])
+def test_a_wrong_focal_length_is_found_and_makes_no_speed_of_a_lean(focal_share: float) -> None:
+    """It moves what is seen away from where the camera looks, which swings with the drone, not from where the
+    drone is: what scales lengths alone would leave a share of each lean as a way that was not flown."""
+
+    def speed_error_mps(share: float) -> tuple[SensorEstimate, float]:
+        squares: list[float] = []
+
+        def look(tracker: LineTracker, t: float) -> None:
+            tracks = tracker.at(round(t * 1e9))
+            if tracks is not None and t > 10.0:
+                off_x, off_y = tracks.vx_mps - swung(WAVES_X, t)[1], tracks.vy_mps - swung(WAVES_Y, t)[1]
+                squares.append(off_x**2 + off_y**2)
+
+        sensors = told(Truth(focal_share=share), 1, look=look)
+        return sensors, math.sqrt(sum(squares) / len(squares))
+
+    sensors, off_mps = speed_error_mps(focal_share)
+    assert abs(1.0 + sensors.scale_share - 1.0 / focal_share) < 2.0 * sensors.scale_sigma < 0.03
+    assert off_mps < 3.5 * speed_error_mps(1.0)[1]
