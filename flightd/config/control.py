@@ -31,13 +31,13 @@ class HorizontalGains(PidGains):
     """The position loop, one each for the grid's x and y."""
 
     kp: float = Field(
-        6.5, ge=0, le=100, description="acceleration per metre off", json_schema_extra=unit("m/s^2 per m")
+        10.0, ge=0, le=100, description="acceleration per metre off", json_schema_extra=unit("m/s^2 per m")
     )
     ki: float = Field(
         0.7, ge=0, le=100, description="its growth per metre off", json_schema_extra=unit("m/s^2 per m s")
     )
     kd: float = Field(
-        4.4, ge=0, le=100, description="acceleration against speed", json_schema_extra=unit("m/s^2 per m/s")
+        5.8, ge=0, le=100, description="acceleration against speed", json_schema_extra=unit("m/s^2 per m/s")
     )
 
 

@@ -214,7 +214,7 @@ class StateEstimator:
         if tracks is not None and pose is not None:
             self.pads.step(tracks, pose)
         by_pad = None if pose is None else self.pads.over(pose, self.localiser.ever_matched)
-        lead = self.tracker.lead(now_ns, now_ns + round(self.response.delay_s * 1e9))
+        lead = self.tracker.lead(now_ns, now_ns + round(self.response.lead_s * 1e9))
         conditions, shared = self._conditions(now_ns), None if pose is None else self._shared(now_ns, pose)
         return Estimate(height_m, tracks, by_pad or pose, by_pad is not None, lead, conditions, shared)
 

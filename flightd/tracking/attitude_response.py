@@ -4,8 +4,8 @@ Telemetry comes late and so do setpoints: what the vehicle tells is what it made
 Both ways together with the autopilot's own attitude loop are a delay and a lag of the second order; which,
 shows in what was told of what was sent.  All of many delays and bandwidths are tried at once, and the
 likeliest is believed.  From the newest told attitude on, its answer to the setpoints sent since is the best
-guess there is: up to the moment at which a setpoint that goes out now begins to act (a Smith predictor's
-model: O. Smith, Closer control of loops with dead time, 1957).  Pure.
+guess there is: up to the moment at which a setpoint that goes out now begins to act, and through most of the
+lag after it (a Smith predictor's model: O. Smith, Closer control of loops with dead time, 1957).  Pure.
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ _BANDWIDTHS_RADPS: Matrix = np.array([6.0, 8.0, 10.0, 13.0, 17.0])
 _FIRST_DELAY_S, _DELAY_SIGMA_S = 0.04, 0.04
 _FIRST_BANDWIDTH_RADPS, _BANDWIDTH_SIGMA = 10.0, 0.3
 """Before anything was seen of it; the bandwidth's is that of its logarithm."""
+_LAG_SHARE = 0.75
+"""How far into the attitude loop's own lag, 2 / bandwidth, the motion is foreseen: a loop that is closed over
+the motion by then swings less where gusts push, and hovers no less still where none does."""
 _YAW_LAG_S = 0.2
 _STEP_S = 0.02
 _KEPT = 1200
@@ -93,6 +96,7 @@ class AttitudeResponse:
         self._speed: Matrix = np.zeros((models, 3))
         self._kept = _Kept(models)
         self._told: Attitude | None = None
+        self._wanted: Matrix = np.zeros(2)
         self._steady: Matrix = np.zeros((len(_DELAYS_S), models, 2))
         self._square: Matrix = np.zeros((len(_DELAYS_S), models))
         self._seen_s = self._settled_s = 0.0
@@ -107,6 +111,11 @@ class AttitudeResponse:
     def bandwidth_radps(self) -> float:
         """Of the attitude loop, as far as is known."""
         return float(_BANDWIDTHS_RADPS[self._model])
+
+    @property
+    def lead_s(self) -> float:
+        """So long after its sending a setpoint has most of its effect."""
+        return self.delay_s + _LAG_SHARE * 2.0 / self.bandwidth_radps
 
     def sent(self, now_ns: int, setpoint: AttitudeSetpoint | None) -> None:
         """What was in force since the last call; None: nothing was sent, and the vehicle does as it likes."""
@@ -133,17 +142,20 @@ class AttitudeResponse:
             self._learn(sample, dt_s)
 
     def foreseen(self, now_ns: int) -> list[Attitude]:
-        """The attitude from the newest told one on, until a setpoint that goes out now begins to act; empty
-        while none was told or nothing was sent."""
+        """The attitude from the newest told one on, for `lead_s` were the setpoint before to stay in force;
+        empty while none was told or nothing was sent."""
         told = self._told
         if told is None or math.isinf(self._kept.oldest_ns):
             return []
-        ahead_ns = min(now_ns + round(self.delay_s * 1e9) - told.stamp_ns, _FORESEEN_NS)
+        ahead_ns = min(now_ns + round(self.lead_s * 1e9) - told.stamp_ns, _FORESEEN_NS)
         steps = min(math.ceil(ahead_ns * 1e-9 / _STEP_S), _MOST_STEPS)
         if steps <= 0 or told.stamp_ns < self._kept.oldest_ns:
             return []
         after_ns = np.linspace(0.0, ahead_ns, steps + 1)
-        answers = self._kept.at(told.stamp_ns + after_ns - self.delay_s * 1e9, _ALL)[:, self._model]
+        sent_ns = told.stamp_ns + after_ns - self.delay_s * 1e9
+        answers = self._kept.at(sent_ns, _ALL)[:, self._model]
+        to_come = sent_ns > now_ns
+        answers[to_come, _TILT] = self._to_come((sent_ns[to_come, None] - now_ns) * 1e-9)
         gained = answers - answers[0]
         return [
             Attitude(
@@ -158,18 +170,21 @@ class AttitudeResponse:
     # How
 
     def _move(self, dt_s: float, setpoint: AttitudeSetpoint) -> None:
-        """Answer the setpoint for a while: critically damped, exactly."""
-        w = _BANDWIDTHS_RADPS[:, None]
-        wanted = np.array([setpoint.roll_rad, setpoint.pitch_rad])
-        off, speed = self._answer[:, _TILT] - wanted, self._speed[:, _TILT]
-        fade, push = np.exp(-w * dt_s), speed + w * off
-        self._answer[:, _TILT] = wanted + (off + push * dt_s) * fade
-        self._speed[:, _TILT] = (speed - w * push * dt_s) * fade
+        """Answer the setpoint for a while."""
+        self._wanted = np.array([setpoint.roll_rad, setpoint.pitch_rad])
+        off, speed = self._answer[:, _TILT] - self._wanted, self._speed[:, _TILT]
+        off, self._speed[:, _TILT] = _settled(off, speed, _BANDWIDTHS_RADPS[:, None], dt_s)
+        self._answer[:, _TILT] = self._wanted + off
         turn = self._speed[:, 2] + (setpoint.yaw_rate_radps - self._speed[:, 2]) * (
             1.0 - math.exp(-dt_s / _YAW_LAG_S)
         )
         self._answer[:, 2] += 0.5 * (self._speed[:, 2] + turn) * dt_s
         self._speed[:, 2] = turn
+
+    def _to_come(self, after_s: Matrix) -> Matrix:
+        """(N, 2) roll and pitch, undelayed, (N, 1) seconds after the newest answer."""
+        answer, speed = self._answer[self._model, _TILT], self._speed[self._model, _TILT]
+        return self._wanted + _settled(answer - self._wanted, speed, self.bandwidth_radps, after_s)[0]
 
     def _learn(self, sample: Attitude, dt_s: float) -> None:
         answers = self._kept.at(sample.stamp_ns - _DELAYS_NS, _TILT)
@@ -196,3 +211,11 @@ class AttitudeResponse:
         mean_s = float(odds @ _DELAYS_S)
         self.delay_sigma_s = math.sqrt(float(odds @ np.square(_DELAYS_S - mean_s)))
         self.delay_s += min(max(mean_s - self.delay_s, -_SHARED_S), _SHARED_S)
+
+
+def _settled(
+    off: Matrix, speed: Matrix, bandwidth_radps: Matrix | float, after_s: Matrix | float
+) -> tuple[Matrix, Matrix]:
+    """What is left of an error and its rate: critically damped, exactly."""
+    fade, push = np.exp(-bandwidth_radps * after_s), speed + bandwidth_radps * off
+    return (off + push * after_s) * fade, (speed - bandwidth_radps * push * after_s) * fade

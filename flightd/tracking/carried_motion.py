@@ -8,8 +8,8 @@ from flightd.core.types import Attitude
 
 
 class Lead(NamedTuple):
-    """What the motion changes by until a setpoint that goes out now begins to act: way and speed along the
-    grid axes, and the heading."""
+    """What the motion changes by until a setpoint that goes out now has most of its effect: way and speed
+    along the grid axes, and the heading."""
 
     x_m: float
     y_m: float

@@ -39,8 +39,8 @@ class Steering:
     ) -> AttitudeSetpoint | None:
         """What control makes of the guidance, within the limits; None when nothing may be sent.  `push` is
         the acceleration that no lean explains, m/s2, grid axes; `stand_yaw_rad` the heading before there is a
-        pose; `lead` what the motion changes by until the setpoint begins to act: it is made for then,
-        under those `conditions`."""
+        pose; `lead` what the motion changes by until the setpoint has most of its effect: it is made for
+        then, under those `conditions`."""
         now_ns, dt_s, pose = inputs.now_ns, inputs.dt_s, inputs.pose
         height_m = self._plausibility.height_m(inputs.height_m)
         motion = self._motion(pose, height_m, dt_s, stand_yaw_rad, lead)

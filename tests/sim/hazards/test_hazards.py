@@ -87,9 +87,11 @@ def silence(flight: IdealFlight) -> None:
     flight.ground_silent_s = 60.0
 
 
-def slow_down(flight: IdealFlight) -> None:
+def ring(flight: IdealFlight) -> None:
+    """The attitude answers slowly and hardly damped: of one that is only slow the loop learns in time."""
     whole = flight.airframe.params
-    flight.airframe.params = replace(whole, attitude_bandwidth_radps=0.3 * whole.attitude_bandwidth_radps)
+    slow_radps = 0.3 * whole.attitude_bandwidth_radps
+    flight.airframe.params = replace(whole, attitude_bandwidth_radps=slow_radps, attitude_damping=0.15)
 
 
 TRIALS: dict[str, Trial] = {
@@ -121,7 +123,7 @@ TRIALS: dict[str, Trial] = {
     "detector_killed": Trial(fault(health=Health(0.08, 1)), ends=Phase.DONE, found_s=0.05),
     "detector_hung": Trial(fault(health=Health(0.08, 2)), ends=Phase.DONE, found_s=0.05),
     "overload": Trial(fault(health=Health(0.4)), found_s=3.2),
-    "swings": Trial(slow_down, ends=Phase.DONE, found_s=20.0),
+    "swings": Trial(ring, found_s=12.0),
     "clock_jump": Trial(fault(stamps_refused=40), ends=Phase.DONE, found_s=0.05),
     "loop_stalled": Trial(fault(stall_ns=400_000_000), ends=Phase.DONE, found_s=0.45),
     "clock_unsure": Trial(

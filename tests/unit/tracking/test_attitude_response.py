@@ -91,7 +91,7 @@ def test_the_attitude_that_is_not_told_yet_is_foreseen(told_s: float) -> None:
         assert heard is not None
         response.told(heard, obeys=True)
         foreseen = response.foreseen(now_ns)
-        assert foreseen[-1].stamp_ns == pytest.approx(now_ns + response.delay_s * 1e9, abs=1e6)
+        assert foreseen[-1].stamp_ns == pytest.approx(now_ns + response.lead_s * 1e9, abs=1e6)
         history = AttitudeHistory()
         history.add(heard)
         history.assume(foreseen)
@@ -149,3 +149,25 @@ def test_a_vehicle_that_fell_silent_for_long_is_still_known_by_what_it_told_last
         if now_ns >= START_NS:
             assert history.newest is not None
             assert history.measured_ns == START_NS
+
+
+def test_what_a_setpoint_makes_of_the_attitude_is_foreseen_into_the_lag_of_the_loop() -> None:
+    """As it will be if the newest setpoint stays in force: nearer by far than the last that acts by then."""
+    vehicle = Vehicle(0.08, told_s=0.1)
+    response, now_ns = flown(vehicle, 8.0)
+    setpoint = AttitudeSetpoint(0, 0.15, -0.1)
+    for _ in range(5):
+        now_ns += TICK_NS
+        response.sent(now_ns, setpoint)
+        response.told(vehicle.step(now_ns, setpoint) or vehicle.samples[0], obeys=True)
+    foreseen = response.foreseen(now_ns)
+    reached, begun = (
+        foreseen[-1],
+        next(one for one in foreseen if one.stamp_ns > now_ns + response.delay_s * 1e9),
+    )
+    for _ in range(round(response.lead_s / 0.02)):
+        now_ns += TICK_NS
+        vehicle.step(now_ns, setpoint)
+    truth = vehicle.samples[-1]
+    assert abs(truth.roll_rad - reached.roll_rad) < 0.25 * abs(truth.roll_rad - begun.roll_rad)
+    assert abs(truth.pitch_rad - reached.pitch_rad) < 0.25 * abs(truth.pitch_rad - begun.pitch_rad)
