@@ -60,6 +60,11 @@ def on_map(floor: FloorStatus, closure: Closure, places: Mapping[str, tuple[floa
     return replace(closure, ways=ways)
 
 
+def everywhere(floor: FloorStatus, closure: Closure, why: str) -> Closure:
+    """The closure over all ways of this map, for it may be over any of them; `why` is told of what waits."""
+    return replace(closure, ways=tuple(sorted({_way(a, b) for a, b in open_ways(floor)})), why=why)
+
+
 def _at(floor: FloorStatus, place: tuple[float, float]) -> str:
     """The node that is there; empty where none is."""
     nearest = min(floor.nodes, key=lambda node: math.dist((node.x_m, node.y_m), place))

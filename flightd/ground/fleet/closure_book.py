@@ -4,6 +4,7 @@ station."""
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -12,9 +13,11 @@ from typing import Any
 from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.fleet.traffic.closures import Closure
-from flightd.ground.fleet.closed_ways import on_map, places_of
+from flightd.ground.fleet.closed_ways import everywhere, on_map, places_of
 from flightd.ground.fleet.fleet_memory import FleetMemory, KeptClosure
 from flightd.ground.fleet.station_traffic import Aside
+
+_LOG = logging.getLogger(__name__)
 
 
 class ClosureBook:
@@ -32,12 +35,17 @@ class ClosureBook:
         self._mapped: tuple[FloorStatus, tuple[KeptClosure, ...], tuple[Closure, ...]] | None = None
 
     def on(self, floor: FloorStatus) -> tuple[Closure, ...]:
-        """All that is closed now, as this map calls it.  InputError where it is not there."""
+        """All that is closed now, as this map calls it.  What is not there is closed everywhere: it may have
+        been closed by the map before while this one was begun."""
         kept, mapped = tuple(self._closed.values()), self._mapped
         if mapped is None or mapped[0] is not floor or mapped[1] != kept:  # traffic asks at every step
-            mapped = floor, kept, tuple(on_map(floor, one.closure, one.places) for one in kept)
-            self._mapped = mapped
+            mapped = self._mapped = floor, kept, tuple(_on_map_or_everywhere(floor, one) for one in kept)
         return mapped[2]
+
+    def check(self, floor: FloorStatus) -> None:
+        """InputError where not all that is closed is on this map."""
+        for one in self._closed.values():
+            on_map(floor, one.closure, one.places)
 
     async def recall(self) -> None:
         """Read what is kept, once.  UnavailableError or InputError where that cannot be read: then nobody
@@ -82,10 +90,18 @@ class ClosureBook:
             {
                 "name": one.closure.name,
                 "ways": flown.get(one.closure.name, one.closure).ways,
-                "why": one.closure.why,
+                "why": flown.get(one.closure.name, one.closure).why,
                 "by": one.by,
                 "utc_s": round(one.utc_s, 1),
                 "inside": inside.get(one.closure.name),
             }
             for one in self._closed.values()
         ]
+
+
+def _on_map_or_everywhere(floor: FloorStatus, one: KeptClosure) -> Closure:
+    try:
+        return on_map(floor, one.closure, one.places)
+    except InputError as err:
+        _LOG.warning("nobody flies: %s", err)
+        return everywhere(floor, one.closure, err.what)

@@ -215,7 +215,7 @@ class OwnFleet(VehicleSides):
     async def _made(self, floors: Mapping[str, FloorStatus], stands: Mapping[str, str]) -> FleetFloor:
         """InputError where they cannot be flown on it, or not all that is closed is there."""
         floor = await self._aside(partial(FleetFloor, floors, stands, self._cell))
-        self._closures.on(floor.map)
+        self._closures.check(floor.map)
         return floor
 
     def _drones_on(self, floor: FleetFloor) -> dict[str, FleetDrone]:

@@ -84,7 +84,7 @@ class Closures(Protocol):
     """What people closed."""
 
     def on(self, floor: FloorStatus) -> Sequence[Closure]:
-        """All of it, now, as that map calls it."""
+        """All of it, now, as that map calls it; raises nothing, for who flies is to leave it."""
         ...
 
 

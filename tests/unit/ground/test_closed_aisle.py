@@ -21,6 +21,7 @@ from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.cells import CellSize
 from flightd.fleet.traffic.closures import Closure
+from flightd.ground.fleet import own_fleet
 from flightd.ground.fleet.closed_ways import aisle_closure, closure_between, on_map, places_of
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor, with_all_pads
 from flightd.ground.fleet.fleet_memory import FILE, FleetMemory, KeptClosure
@@ -310,6 +311,67 @@ def test_a_map_that_lacks_what_is_closed_is_flown_by_once_that_is_open(
         await fleet.own.open("A4, A5")
         await until(lambda: all(map(fleet.flown, "ab")), 30)
         assert fleet.state["trouble"] == ""
+
+    fly(go, "ab")
+
+
+def test_what_is_closed_on_the_old_map_as_the_next_one_begins_grounds_all_and_loses_no_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    begin = FleetMemory.begin
+
+    async def go(fleet: PaperFleet) -> None:
+        for drone in fleet.drones.values():
+            drone.never_starts = True
+        fleet.own.ask(["B3"])
+        await asyncio.sleep(5.0)
+
+        def begins(*of: Any) -> None:
+            begin(*of)
+            fleet.deciding = asyncio.Event()
+
+        monkeypatch.setattr(FleetMemory, "begin", begins)
+        monkeypatch.setattr(paper_drones, "_STEPS_M", (2.0, 1.6, 1.6))
+        monkeypatch.setattr(paper_drones, "PADS", {"a": "A1", "b": "B1"})
+        for name, drone in fleet.drones.items():
+            drone.site, drone.never_starts = hall(name), False
+            drone.begin_anew()
+        await until(lambda: fleet.deciding is not None, 60)
+        closing = asyncio.ensure_future(fleet.own.close("ann", nodes=["A4", "A5"]))
+        await asyncio.sleep(0.1)
+        assert fleet.deciding is not None
+        fleet.deciding.set()
+        await closing
+        await until(lambda: fleet.state["flies"] and closure(fleet)["inside"] == ())
+        await asyncio.sleep(180.0)
+        why = "what is between A4, A5 is closed, but on another map (fleet.db)"
+        assert (fleet.state["trouble"], fleet.state["not_done"]) == ("", {"B3": why})
+        assert closure(fleet)["why"] == why
+        assert {drone.phase for drone in fleet.drones.values()} == {Phase.PREFLIGHT}
+        told = [one.message for one in caplog.records if why in one.message]
+        assert told == [f"nobody flies: {why}; open it, and close it again"]
+        await fleet.own.open("A4, A5")
+        fleet.own.ask(["B3"])
+        await until_done(fleet, "B3")
+
+    fly(go, "ab", memory=FleetMemory(tmp_path))
+
+
+def test_where_what_is_closed_is_not_on_the_map_who_flies_comes_home(monkeypatch: pytest.MonkeyPatch) -> None:
+    elsewhere = Closure("X", (("A2", "X1"),), "what is between A2, X1 is closed")
+    monkeypatch.setattr(own_fleet, "closure_between", lambda *_: elsewhere)
+
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        await on_way_to("B4", fleet)
+        await fleet.own.close("ann", nodes=["A2", "X1"])
+        await until(lambda: "b" in (closure(fleet)["inside"] or ()), 5)
+        await until(lambda: b.phase is Phase.DONE and at_rest(fleet), 200)
+        assert (b.truth.x_m, "home" in b.commands) == (0.0, False)
+        assert fleet.state["not_done"] == {"B4": f"{elsewhere.why}, but on another map (fleet.db)"}
+        await until(lambda: closure(fleet)["inside"] == (), 5)
+        await fleet.own.open("X")
+        await until_done(fleet, "B4")
 
     fly(go, "ab")
 
