@@ -101,12 +101,20 @@ class FleetMemory:
         self._utc_s = utc_s
         self._newest: object = None
 
-    def begin(self, floor: KeptFloor) -> None:
-        """The fleet flies by these maps from now on; nothing of before is left but what people closed."""
+    def begin(
+        self,
+        floor: KeptFloor,
+        drones: Mapping[str, KeptDrone],
+        work: KeptWork,
+        *,
+        runs: tuple[str, ...] = (),
+    ) -> None:
+        """The fleet flies by these maps from now on, and is so as it begins; nothing else of before is left
+        but what people closed."""
         self._newest = None
         with self._database.changed() as kept:
-            kept.execute("DELETE FROM kept WHERE name IN ('floor', 'fleet')")
             _put(kept, "floor", replace(floor, version=__version__))
+            _put(kept, "fleet", KeptFleet(drones, work, self._utc_s(), runs))
 
     def keep(
         self, drones: Mapping[str, KeptDrone], work: KeptWork, *, waits: bool, runs: tuple[str, ...] = ()

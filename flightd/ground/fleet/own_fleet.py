@@ -290,9 +290,18 @@ class OwnFleet(VehicleSides):
             return
         if self._fleet is not None:
             self._give_up_moved(self._fleet[0].map, floor.map)
-        kept = KeptFloor(floors, standings)
-        await self._write(lambda memory: memory.begin(kept))
-        await self._begin(floor, self._drones_on(floor), pace_of(standings.values()))
+        drones = self._drones_on(floor)
+        await self._keep_begun(KeptFloor(floors, standings), drones)
+        await self._begin(floor, drones, pace_of(standings.values()))
+
+    async def _keep_begun(self, floor: KeptFloor, drones: Mapping[str, FleetDrone]) -> None:
+        """With the work: a station that dies before it has decided anything loses none."""
+        for drone in drones.values():
+            drone.look()
+        kept = {name: drone.kept() for name, drone in drones.items()}
+        work, runs = self._queue.kept(), self._runs
+        if await self._write(lambda memory: memory.begin(floor, kept, work, runs=runs)):
+            self._kept_runs = frozenset(runs)
 
     def _give_up_moved(self, before: FloorStatus, after: FloorStatus) -> None:
         """A node that is called as another one was is none that somebody asked for."""

@@ -326,8 +326,8 @@ def test_what_is_closed_on_the_old_map_as_the_next_one_begins_grounds_all_and_lo
         fleet.own.ask(["B3"])
         await asyncio.sleep(5.0)
 
-        def begins(*of: Any) -> None:
-            begin(*of)
+        def begins(*of: Any, **more: Any) -> None:
+            begin(*of, **more)
             fleet.deciding = asyncio.Event()
 
         monkeypatch.setattr(FleetMemory, "begin", begins)

@@ -6,12 +6,14 @@ import asyncio
 import random
 import sqlite3
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from flightd.core.types import CommandKind, Phase
 from flightd.ground.fleet.fleet_memory import FILE, TOO_OLD, FleetMemory
 from flightd.ground.messages import Act
+from tests.rigs.paper_drones import hall
 from tests.rigs.paper_fleet import PaperFleet, fly, on_way_to, until
 
 _RESTS = {Phase.DONE, Phase.PREFLIGHT}
@@ -199,6 +201,40 @@ def test_nobody_leaves_the_ground_for_what_a_station_before_was_asked_for(tmp_pa
         await asyncio.sleep(30.0)
         assert fleet.state["open"] == ["A3"]
         assert {drone.phase for drone in fleet.drones.values()} == {Phase.PREFLIGHT}
+        fleet.own.ask(["B3"])
+        await until_done(fleet, "A3 B3")
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
+def test_a_station_that_dies_as_it_begins_by_another_map_leaves_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = FleetMemory.begin
+
+    async def go(fleet: PaperFleet) -> None:
+        for drone in fleet.drones.values():
+            drone.never_starts = True
+        fleet.own.ask(["A3"])
+        await asyncio.sleep(5.0)
+
+        def begins(*of: Any, **more: Any) -> None:
+            begin(*of, **more)
+            fleet.deciding = asyncio.Event()  # nothing comes after it
+
+        with monkeypatch.context() as patched:
+            patched.setattr(FleetMemory, "begin", begins)
+            for name, drone in fleet.drones.items():
+                drone.site = hall(name, "hall 2")
+                drone.begin_anew()
+            await until(lambda: fleet.deciding is not None, 60)
+            await fleet.kill()
+        fleet.deciding = None
+        fleet.start_again()
+        await until(lambda: fleet.state["flies"])
+        assert (fleet.own.site, fleet.state["open"]) == ("hall 2", ["A3"])
+        for drone in fleet.drones.values():
+            drone.never_starts = False
         fleet.own.ask(["B3"])
         await until_done(fleet, "A3 B3")
 
