@@ -82,10 +82,12 @@ def fleet_objection(site: str, fleet: ScheduledFleet, drones: Mapping[str, Heard
 def _none_ready(fleet: ScheduledFleet, own: Mapping[str, HeardDrone]) -> Objection | None:
     """Why no drone would fly now: of those that are the fleet's one has to fly, or nothing to keep it on the
     ground."""
+    heard = {name: drone.heard for name, drone in own.items() if drone.heard is not None}
+    if not heard:
+        return Objection(Cause.UNREACHABLE, "the drone is not heard")
     why = Objection(Cause.PERSON, "a person has it")
-    for name, drone in own.items():
-        status = drone.heard
-        if status is None or not fleet.flies(name):
+    for name, status in heard.items():
+        if not fleet.flies(name):
             continue
         if status.phase is not Phase.PREFLIGHT and status.possible:
             return None

@@ -49,8 +49,8 @@ class Link:
                        picture_fps=0.0, floor=floor, events=())  # fmt: skip
 
     @property
-    def heard(self) -> StatusReport:
-        return self.drone.status
+    def heard(self) -> StatusReport | None:
+        return self.drone.status if self.drone.heard else None
 
     async def act(self, *_: Any, **__: Any) -> Any:
         pytest.fail("the fleet flies it")
@@ -160,6 +160,32 @@ def test_what_keeps_all_drones_on_the_ground_is_told_and_the_run_is_caught_up(tm
         run = await station.look(DUE + timedelta(minutes=21))
         assert run is not None
         assert run.state is RunState.STARTED
+
+    night(tmp_path, go)
+
+
+@pytest.mark.parametrize(
+    ("silent", "taken", "cause", "why"),
+    [
+        ("ab", "", "unreachable", "the drone is not heard"),
+        ("ab", "a", "unreachable", "the drone is not heard"),
+        ("a", "b", "person", "a person has it"),
+        ("", "ab", "person", "a person has it"),
+    ],
+)
+def test_why_no_drone_would_fly_is_told(
+    tmp_path: Path, silent: str, taken: str, cause: str, why: str
+) -> None:
+    async def go(station: Station) -> None:
+        fleet = station.fleet
+        for name in taken:
+            fleet.own.hand_over(name, to_manager=False)
+        for name in silent:
+            fleet.drones[name].heard = False
+        await asyncio.sleep(5.0)
+        run = await station.look()
+        assert run is not None
+        assert (run.state, run.cause, run.why) == (RunState.WAITING, cause, why)
 
     night(tmp_path, go)
 
