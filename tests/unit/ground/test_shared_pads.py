@@ -76,6 +76,29 @@ def test_two_that_are_low_never_come_to_one_pad() -> None:
     fly(go, "ab", docks=DOCKS)
 
 
+def test_who_is_charged_and_may_not_be_sent_anywhere_keeps_the_pad_until_he_may() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a, b = fleet.drones["a"], fleet.drones["b"]
+        a.battery_frac = 0.5
+        fleet.own.ask(["A3"], "a")
+        await on_dock(fleet, "a")
+        a.battery_frac, a.obstacles = 0.9, ("the aisle is not closed",)
+        b.battery_frac = 0.5
+        fleet.own.ask(["B3"], "b")
+        commands, plan = len(a.commands), []
+        for _ in range(1200):
+            await asyncio.sleep(0.1)
+            plan += fleet.state["drones"]["a"]["plan"]
+        assert (plan, len(a.commands), holder(fleet)) == ([], commands, ("a", True))
+        assert "B3" in fleet.state["done"], "b was done, and low"
+        a.obstacles = ()
+        b.begin_anew()
+        fleet.own.ask(["B4"], "b")
+        await until(lambda: a.phase is Phase.DONE, 300)
+
+    fly(go, "ab", docks=DOCKS)
+
+
 def test_what_a_drone_chooses_by_itself_frees_the_pad_that_was_promised() -> None:
     async def go(fleet: PaperFleet) -> None:
         a = fleet.drones["a"]
