@@ -79,6 +79,7 @@ def application(
     flights: Flights,
     uploads: ReadingProcess,
     maps: ReadingProcess,
+    facts: SiteFacts,
     studio: Studio | None = None,
     simulated: SimulatedFlight | None = None,
     others: Sequence[ReadFolder] = (),
@@ -89,11 +90,10 @@ def application(
 ) -> ASGIApp:
     """The whole station as ASGI; `hosts` are the names under which it may be asked, `access` knows who asks,
     `people` who sits at a page, inventories, site files and `flights` lie under `folder`, more inventories
-    under the `others`, `uploads` reads what people send, `maps` lays out maps, `studio` and `simulated` are
-    None without a folder; `managers` fly drones, too; programs ask the `store`; `own_fleet` takes tours;
-    schedules go by the `clock`."""
+    under the `others`, `uploads` reads what people send, `maps` lays out maps, `facts` say what is worth
+    most, `studio` and `simulated` are None without a folder; `managers` fly drones, too; programs ask the
+    `store`; `own_fleet` takes tours; schedules go by the `clock`."""
     orders = Orders(hub.drones, access)
-    facts = SiteFacts(store, folder, others, uploads, clock.utc_ns)
     routes = [
         first_page(),
         WebSocketRoute("/live", partial(_live, hub, orders, people)),

@@ -21,6 +21,7 @@ from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.access.access import Access
 from flightd.ground.application import application
 from flightd.ground.fleet.own_fleet import OwnFleet
+from flightd.ground.fleet.site_facts import SiteFacts
 from flightd.ground.flights.flights import Flights
 from flightd.ground.ground_store.feeder import Feeder
 from flightd.ground.ground_store.store import GroundStore
@@ -210,14 +211,20 @@ async def serve(
     viewers = (*viewers, *(viewer for viewer in (fleet, own_fleet) if viewer is not None))
     managers = fleet if own_fleet is None else own_fleet
     hub = Hub(drones, viewers, attends=own_fleet is not None)
-    flights, uploads = Flights(folder, others=others), ReadingProcess()
+    flights = Flights(folder, others=others)
+    uploads, maps = ReadingProcess(), ReadingProcess(refusal="too many maps are being checked")
     studio = None if folder is None else Studio(folder, flights)
     simulated = None if folder is None else SimulatedFlight(hub, folder, where.is_beyond)
     people = PagePeople(access, hub.drones)
     quiet_log()
-    maps = ReadingProcess(refusal="too many maps are being checked")
-    names = () if certificate is None else certificate.names
-    hosts = own_hosts(where.host, where.port, certificate is not None, names, where.is_beyond)
+    hosts = own_hosts(
+        where.host,
+        where.port,
+        certificate is not None,
+        () if certificate is None else certificate.names,
+        where.is_beyond,
+    )
+    facts = SiteFacts(store, folder, others, uploads, clock.utc_ns)
     server = _Server(
         uvicorn.Config(
             application(
@@ -229,6 +236,7 @@ async def serve(
                 flights,
                 uploads,
                 maps,
+                facts,
                 studio,
                 simulated,
                 others,
@@ -261,8 +269,8 @@ async def serve(
             tasks.create_task(one.run(hub), name="fleet") for one in (fleet, own_fleet) if one is not None
         ]
         if folder is not None:
-            book, missions = ScheduleBook(folder), MissionBook(folder)
-            shift = NightShift(book, missions, store, hub.drones, access, managers, clock, own_fleet)
+            books = ScheduleBook(folder), MissionBook(folder)
+            shift = NightShift(*books, store, facts, hub.drones, access, managers, clock, own_fleet)
             tasks.create_task(shift.run(), name="schedules")
         if studio is not None:
             tasks.create_task(studio.run(), name="studio")

@@ -80,6 +80,8 @@ STAYS_ENGLISH = {
     "a plan that waits at its end has nodes": "told to programs: no page asks for it",
     "only goto and a plan over nodes end by waiting": "told to programs: no page asks for it",
     "only a goto that does not wait lands on another pad": "told to programs: no page asks for it",
+    "nodes and aisles are given": "told to programs: no page asks for it",
+    "leave one out": "the end of that",
     "no pad at {}": "told to programs: no page asks for it",
     "no role is set for {}: add it to route_roles.py": "an error of ours: the station does not start",
     "{}: it takes every method; name those that it has": "an error of ours: the station does not start",

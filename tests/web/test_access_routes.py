@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ from flightd.ground.access.people_book import PeopleBook
 from flightd.ground.access.roles import Role
 from flightd.ground.access.route_roles import RULES
 from flightd.ground.application import application
+from flightd.ground.fleet.site_facts import SiteFacts
 from flightd.ground.flights.flights import Flights
 from flightd.ground.ground_store.open_store import opened_store
 from flightd.ground.guards import own_hosts
@@ -50,6 +52,7 @@ def routes_of(tmp_path: Path) -> list[str]:
     """Every route of a station, as the rules name them."""
     access, flights = Access(tmp_path, login=False, secure=False), Flights(tmp_path)
     hub, store = Hub([]), opened_store(str(tmp_path / "store.db"))
+    reading = ReadingProcess()
     guard = application(
         hub,
         own_hosts("127.0.0.1", 1),
@@ -57,8 +60,9 @@ def routes_of(tmp_path: Path) -> list[str]:
         PagePeople(access, hub.drones),
         tmp_path,
         flights,
+        reading,
         ReadingProcess(),
-        ReadingProcess(),
+        SiteFacts(store, tmp_path, (), reading, time.time_ns),
         Studio(tmp_path, flights),
         store=store,
     )

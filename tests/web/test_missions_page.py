@@ -158,6 +158,23 @@ def test_a_flight_is_chosen_estimated_kept_flown_and_flown_on_and_places_become_
         assert page.evaluate("document.documentElement.scrollWidth") <= NARROW[0]
 
 
+def test_a_schedule_of_what_is_worth_most_is_kept_with_how_many_nodes(browser: Browser, url: str) -> None:
+    with opened(browser, f"{url}/missions") as page:
+        card = page.get_by_role("region", name="Schedules")
+        card.get_by_role("button", name="New schedule").press("Enter")
+        card.get_by_label("Name").fill("Most valuable")
+        card.get_by_label("What is counted").select_option(label="Work by value")
+        card.get_by_label("How many").fill("12")
+        card.get_by_label("Time zone").fill("UTC")
+        with page.expect_request(lambda asked: asked.method == "PUT") as kept:
+            card.get_by_role("button", name="Keep schedule").press("Enter")
+        assert kept.value.post_data_json["count"] == {"kind": "value", "nodes": 12}
+        expect(card.get_by_text("Work by value · every day at 22:00, UTC")).to_be_visible()
+        card.get_by_role("button", name="Delete Most valuable").press("Enter")
+        card.get_by_role("button", name="Delete Most valuable for good").press("Enter")
+        expect(card.get_by_text("None yet.")).to_be_visible()
+
+
 def test_a_schedule_is_kept_listed_suspended_and_deleted(browser: Browser, url: str) -> None:
     with opened(browser, f"{url}/missions", NARROW) as page:
         card = page.get_by_role("region", name="Schedules")

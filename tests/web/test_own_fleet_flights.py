@@ -121,7 +121,7 @@ async def test_without_a_fleet_nothing_is_flown_and_stop_is_there_for_all(tmp_pa
         code, said = await station.ask("POST", "/api/fleet/tour", own, b'{"nodes": []}')
         assert (code, "not a tour" in said) == (400, True)
         both = await station.ask("POST", "/api/fleet/value", own, b'{"nodes": 2, "aisles": 1}')
-        assert (both[0], "so many nodes are asked for, or so many aisles" in both[1]) == (400, True)
+        assert (both[0], "nodes and aisles are given; leave one out" in both[1]) == (400, True)
         code, said = await station.ask("POST", "/api/fleet/stop", own)
         assert (code, "north cannot be reached" in json.loads(said)["refused"]["north"]) == (200, True)
     lines = newest_entries(tmp_path, 9)

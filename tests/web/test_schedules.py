@@ -136,6 +136,7 @@ async def test_schedules_are_kept_with_their_next_runs_and_one_clear_line_for_ba
             {"count": {"kind": "everything"}}, {"count": {"kind": "aisles", "aisles": []}},
             {"late_minutes": 1}, {"quiet": [{"begin": "21:00", "end": "23:30"}]}, {"first": "soon"},
             {"every_days": 7, "first": "2026-01-05"}, {"count": {"kind": "all", "within_days": 0}},
+            {"count": {"kind": "value", "nodes": 0}}, {"count": {"kind": "value", "nodes": 1, "aisles": 1}},
         )  # fmt: skip
         for wrong in bad:
             code, told = await ask(station, "PUT", "/schedule-2", **{**TUESDAYS, "name": "B", **wrong})

@@ -15,7 +15,7 @@ from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.types import CommandKind
 from flightd.fleet.traffic.cells import CellSize
-from flightd.fleet.traffic.valued_work import Worth
+from flightd.fleet.traffic.valued_work import UNKNOWN, Worth
 from flightd.fleet.traffic.work_queue import WorkQueue
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.access.roles import Identity, Role
@@ -31,6 +31,7 @@ from flightd.ground.messages import Act
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.ground.mqtt.safe_return import Standing
 from flightd.ground.mqtt.vehicle_sides import VehicleSides
+from flightd.ground.valued_nodes import ByValue
 from flightd.mission.plan.leg_times import Pace
 from flightd.site.site import SAME_NODE_M
 
@@ -320,12 +321,11 @@ class OwnFleet(VehicleSides):
             raise InputError(f"no drone of the fleet is called {drone}")
         self._asked_traffic().ask(nodes, drone)
 
-    def ask_by_value(
-        self, worth: Mapping[str, Worth], nodes: int | None = None, aisles: int | None = None
-    ) -> tuple[str, ...]:
-        """Have the most valuable visited: so many `nodes`, or all of so many `aisles`, or everything; which.
-        UnavailableError where the fleet does not fly yet."""
-        return self._asked_traffic().ask_by_value(worth, nodes, aisles)
+    def ask_by_value(self, worth: Mapping[str, Worth], asked: ByValue) -> tuple[str, ...]:
+        """Have the most valuable visited; which.  UnavailableError where the fleet does not fly yet."""
+        chosen = self.valued(worth, asked)
+        self._asked_traffic().ask_worth({node: worth.get(node, UNKNOWN) for node in chosen})
+        return chosen
 
     # what schedules ask of it
 
@@ -344,6 +344,11 @@ class OwnFleet(VehicleSides):
         """Why it does not fly; empty where it does."""
         return "" if self._traffic is not None else self._trouble or "no drone told its map yet"
 
+    def valued(self, worth: Mapping[str, Worth], asked: ByValue) -> tuple[str, ...]:
+        """The most valuable nodes that may be asked for now.  UnavailableError where the fleet does not
+        fly."""
+        return self._flying().valued(worth, asked)
+
     def knows_run(self, run: str) -> bool:
         """The work of a run is written down as given, with the run's id."""
         return run in self._kept_runs
@@ -358,10 +363,14 @@ class OwnFleet(VehicleSides):
 
     def _asked_traffic(self) -> StationTraffic:
         """Of which a person asks something: drones may leave the ground for it."""
-        if self._traffic is None:
-            raise UnavailableError(f"the fleet does not fly: {self._trouble}")
+        traffic = self._flying()
         for each in self._fleet[1].values() if self._fleet is not None else ():
             each.may_start = True
+        return traffic
+
+    def _flying(self) -> StationTraffic:
+        if self._traffic is None:
+            raise UnavailableError(f"the fleet does not fly: {self._trouble}")
         return self._traffic
 
     @property

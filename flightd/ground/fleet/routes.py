@@ -22,6 +22,7 @@ from flightd.ground.hub import Hub
 from flightd.ground.json_http import as_json, or_refused, said
 from flightd.ground.pages import page
 from flightd.ground.shown_text import shown
+from flightd.ground.valued_nodes import ByValue
 
 _Name = Annotated[str, Meta(max_length=128)]
 
@@ -31,14 +32,6 @@ class AskedTour(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     nodes: Annotated[list[_Name], Meta(min_length=1, max_length=MOST_NODES)]
     drone: _Name = ""
-
-
-class AskedByValue(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The so many most valuable `nodes`, or all of the so many most valuable `aisles`; neither: everything,
-    the most valuable first."""
-
-    nodes: Annotated[int, Meta(ge=1, le=MOST_NODES)] | None = None
-    aisles: Annotated[int, Meta(ge=1, le=MOST_NODES)] | None = None
 
 
 class AskedClosure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -72,13 +65,12 @@ def fleet_routes(fleet: OwnFleet | None, hub: Hub, access: Access, facts: SiteFa
         return as_json({})
 
     async def ask_by_value(request: Request) -> Response:
-        asked = await said(request, AskedByValue, "work by value")
-        if asked.nodes is not None and asked.aisles is not None:
-            raise InputError("so many nodes are asked for, or so many aisles")
+        asked = await said(request, ByValue, "work by value")
+        asked.check()
         what = "nodes" if asked.aisles is None else "aisles"
         note_act(request, f"visit the most valuable: {asked.nodes or asked.aisles or 'all'} {what}")
         worth = worth_of(await facts.of(own().site))
-        return as_json({"asked": own().ask_by_value(worth, asked.nodes, asked.aisles)})
+        return as_json({"asked": own().ask_by_value(worth, asked)})
 
     async def close(request: Request) -> Response:
         asked = await said(request, AskedClosure, "what is to be closed")

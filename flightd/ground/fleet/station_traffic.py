@@ -7,7 +7,7 @@ flown by somebody else: the air of its way is closed until it rests where traffi
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Protocol, TypeAlias, TypeVar
@@ -20,13 +20,14 @@ from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
 from flightd.fleet.traffic.endurance import Endurance
 from flightd.fleet.traffic.plan import Action
 from flightd.fleet.traffic.traffic_control import TrafficControl
-from flightd.fleet.traffic.valued_work import UNKNOWN, Worth, most_valuable
+from flightd.fleet.traffic.valued_work import Worth
 from flightd.fleet.traffic.work_queue import NodeWork, Value, WorkQueue
 from flightd.ground.fleet.fleet_drone import FLIGHT_S, RESERVE, FleetDrone
 from flightd.ground.fleet.fleet_floor import HEIGHT_M, FleetFloor
 from flightd.ground.fleet.fleet_memory import KeptDrone
 from flightd.ground.fleet.traffic_view import TrafficView
 from flightd.ground.mqtt.safe_return import Standing
+from flightd.ground.valued_nodes import ByValue, valued_nodes
 from flightd.mission.plan.leg_times import Pace
 
 _LOG = logging.getLogger(__name__)
@@ -163,33 +164,19 @@ class StationTraffic:
         """The same, for nodes that are worth more or less."""
         if unknown := [node for node in worth if node not in self._floor.lanes.column_of]:
             raise InputError(f"no node is called {unknown[0]}")
-        work = self._work(lambda node: worth.get(node, UNKNOWN), drone)
-        self._want(one for one in work if one.node in worth)
-
-    def ask_by_value(
-        self, worth: Mapping[str, Worth], nodes: int | None = None, aisles: int | None = None
-    ) -> tuple[str, ...]:
-        """Have the most valuable (`most_valuable`) nodes visited of those that face a shelf, do not wait yet,
-        and are not closed; which."""
-        shelved = {node.id for node in self._floor.nodes if node.levels} or set(self._floor.lanes.column_of)
-        closed = {node for one in self._closures.on(self._floor.map) for node in one.nodes}
-        known = {*self._queue.open, *self._queue.given, *self._asked, *closed}
-        work = self._work(lambda node: worth.get(node, UNKNOWN))
-        chosen = most_valuable(
-            [one for one in work if one.node in shelved and one.node not in known], nodes, aisles
-        )
-        self._want(chosen)
-        return tuple(one.node for one in chosen)
-
-    def _work(self, worth: Callable[[str], Worth], drone: str = "") -> Iterator[NodeWork]:
         for i, node in enumerate(self._floor.nodes):
-            its = worth(node.id)
-            yield NodeWork(node.id, node.aisle, i, (), self._dwell_ms, its.value, its.age_s, drone)
-
-    def _want(self, work: Iterable[NodeWork]) -> None:
-        self._asked |= {one.node: one for one in work}
+            its = worth.get(node.id)
+            if its is not None:
+                work = NodeWork(node.id, node.aisle, i, (), self._dwell_ms, its.value, its.age_s, drone)
+                self._asked[node.id] = work
         if not self._decides:
             self._take_asked()
+
+    def valued(self, worth: Mapping[str, Worth], asked: ByValue) -> tuple[str, ...]:
+        """The most valuable nodes (`valued_nodes`) that do not wait yet, and are not closed."""
+        closed = {node for one in self._closures.on(self._floor.map) for node in one.nodes}
+        known = {*self._queue.open, *self._queue.given, *self._asked, *closed}
+        return valued_nodes(self._floor.map, worth, asked, known)
 
     def _take_asked(self) -> None:
         self._queue.ask(self._asked.values())

@@ -12,6 +12,7 @@ from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import Phase
 from flightd.fleet.traffic.valued_work import Worth
 from flightd.ground.schedules.start_rules import Cause, Objection
+from flightd.ground.valued_nodes import ByValue
 
 
 class ScheduledFleet(Protocol):
@@ -38,6 +39,11 @@ class ScheduledFleet(Protocol):
 
     def knows_run(self, run: str) -> bool:
         """The work of a run is written down as given, with the run's id."""
+        ...
+
+    def valued(self, worth: Mapping[str, Worth], asked: ByValue) -> tuple[str, ...]:
+        """The most valuable nodes that may be asked for now.  UnavailableError where the fleet does not
+        fly."""
         ...
 
     def take_run(self, run: str, worth: Mapping[str, Worth]) -> None:

@@ -13,6 +13,7 @@ from msgspec import Meta
 from flightd.core.errors import InputError
 from flightd.core.planned_flight import MOST_NODES
 from flightd.fleet.schedule.rule import EARLIEST, MOST_DAYS, Quiet, Rule
+from flightd.ground.valued_nodes import ByValue
 
 _Name = Annotated[str, Meta(min_length=1, max_length=80)]
 _Clock = Annotated[str, Meta(pattern=r"^([01]\d|2[0-3]):[0-5]\d$")]
@@ -39,7 +40,12 @@ class CountAll(msgspec.Struct, frozen=True, tag="all", tag_field="kind", forbid_
     within_days: Annotated[int, Meta(ge=1, le=MOST_DAYS)]
 
 
-Count: TypeAlias = CountMission | CountAisles | CountAll
+class CountByValue(ByValue, frozen=True, tag="value", tag_field="kind", forbid_unknown_fields=True):
+    """What is worth most when the run starts, exceptions first: by the ground store and the books."""
+
+
+CountOfList: TypeAlias = CountMission | CountAisles | CountAll
+Count: TypeAlias = CountOfList | CountByValue
 
 
 class QuietHours(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -67,8 +73,11 @@ class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     enabled: bool = True
 
     def checked(self) -> Kept:
-        """With its words trimmed.  InputError for a schedule by which nothing would ever start."""
+        """With its words trimmed.  InputError for a schedule by which nothing would ever start, or that says
+        twice how much is counted."""
         rule_of(self)
+        if isinstance(self.count, CountByValue):
+            self.count.check()
         name = " ".join(self.name.split())
         if not name:
             raise InputError("a schedule needs a name")

@@ -17,13 +17,14 @@ from datetime import datetime
 from typing import Final, Protocol
 
 from flightd.adapters.ground_link.messages.answers import Accepted, Planned, Welcome
+from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.errors import FlightdError, InputError, RunError
 from flightd.core.types import CommandKind, Phase
 from flightd.core.utc_time import utc_time
 from flightd.fleet.schedule.due import LOOK_BACK, decide
 from flightd.fleet.schedule.rule import MOST_WINDOW, Occurrence
-from flightd.fleet.traffic.valued_work import Worth
+from flightd.fleet.traffic.valued_work import UNKNOWN, PlaceFacts, Worth, worth_of
 from flightd.fleet.traffic.work_queue import Value
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.bounded import Threads
@@ -32,10 +33,11 @@ from flightd.ground.manager_routes import Managers
 from flightd.ground.messages import Act
 from flightd.ground.missions.mission_book import MissionBook
 from flightd.ground.schedules.fleet_runs import ScheduledFleet, fleet_objection
-from flightd.ground.schedules.kept import CountAll, CountMission, Schedule
+from flightd.ground.schedules.kept import CountAll, CountByValue, CountMission, Schedule
 from flightd.ground.schedules.schedule_book import MOST_RUNS, ORDERED, Run, RunState, ScheduleBook
 from flightd.ground.schedules.start_rules import PLAN, Cause, Objection, is_flying_plan, objection
-from flightd.ground.schedules.work import Work, work_of
+from flightd.ground.schedules.work import Work, valued_work, work_of
+from flightd.ground.valued_nodes import valued_nodes
 
 _LOG = logging.getLogger(__name__)
 _AT_ONCE, _MOST_WAITING = 1, 8
@@ -98,15 +100,24 @@ class Audit(Protocol):
         ...
 
 
+class Facts(Protocol):
+    """What `SiteFacts` is to a schedule."""
+
+    async def of(self, site: str) -> Sequence[PlaceFacts]:
+        """Every place that is known.  FlightdError where that cannot be read."""
+        ...
+
+
 class NightShift:
     """`run` looks at the schedules of the `book` until cancelled; what a run counts is in the `missions`, in
-    the `store` and on the drone's floor."""
+    the `store` and on the drone's floor, and what is worth most of it by the `facts`."""
 
     def __init__(
         self,
         book: ScheduleBook,
         missions: MissionBook,
         store: GroundStore | None,
+        facts: Facts,
         drones: Mapping[str, ScheduledDrone],
         audit: Audit,
         managers: Managers | None = None,
@@ -118,6 +129,7 @@ class NightShift:
         self._book = book
         self._missions = missions
         self._store = store
+        self._facts = facts
         self._drones = drones
         self._audit = audit
         self._managers = managers
@@ -125,7 +137,8 @@ class NightShift:
         self._threads = Threads(_AT_ONCE, _MOST_WAITING, "the schedules are being looked at already")
         self._trouble: dict[str, str] = {}
         self._rests: dict[str, float] = {}
-        """Until when nothing is ordered for a schedule, by the loop's clock: its drone has just refused."""
+        """Until when nothing is ordered for a schedule, by the loop's clock: its drone has just refused, or
+        what it counts could not be known."""
 
     async def run(self) -> None:
         """Look, and look again."""
@@ -209,8 +222,9 @@ class NightShift:
             await self._wait(schedule, due, known, against or _OFF)
             return
         try:
-            work: Work = await self._threads.run(work_of, schedule, floor, self._missions, self._store, now)
+            work = await self._work(schedule, floor, fleet, now)
         except FlightdError as err:
+            self._rest(schedule)
             await self._wait(schedule, due, known, Objection(Cause.WORK, str(err)))
             return
         if fleet is not None and work.levels:
@@ -235,6 +249,17 @@ class NightShift:
         else:
             await self._order(schedule, run, drone, may_be_started=False)
 
+    async def _work(
+        self, schedule: Schedule, floor: FloorStatus, fleet: ScheduledFleet | None, now: datetime
+    ) -> Work:
+        """FlightdError where that is nothing, or cannot be known."""
+        count = schedule.kept.count
+        if not isinstance(count, CountByValue):
+            return await self._threads.run(work_of, schedule, count, floor, self._missions, self._store, now)
+        worth = worth_of(await self._facts.of(schedule.kept.site))
+        chosen = valued_nodes(floor, worth, count) if fleet is None else fleet.valued(worth, count)
+        return valued_work(floor, worth, chosen)
+
     def _fleet_of(self, drone: ScheduledDrone) -> ScheduledFleet | None:
         """That of which a drone is one."""
         return self._fleet if self._fleet is not None and drone.name in self._fleet.names else None
@@ -244,7 +269,7 @@ class NightShift:
         down the run is none that was started."""
         if not fleet.knows_run(run.plan):
             try:
-                fleet.take_run(run.plan, _worth(schedule, run.nodes))
+                fleet.take_run(run.plan, await self._worth(schedule, run.nodes))
             except FlightdError as err:
                 await self._refused(schedule, run, RunState.WAITING, str(err))
                 return
@@ -309,11 +334,14 @@ class NightShift:
     async def _refused(self, schedule: Schedule, run: Run, state: RunState, why: str) -> None:
         """The drone does not take it: that may change, unless another flightd answered than may have started
         it."""
+        self._rest(schedule)
+        await self._write(replace(run, state=state, cause=Cause.REFUSED.value, why=why))
+        self._write_down(schedule, run, "refused", why)
+
+    def _rest(self, schedule: Schedule) -> None:
         now_s = asyncio.get_running_loop().time()
         self._rests = {of: until_s for of, until_s in self._rests.items() if until_s > now_s}
         self._rests[schedule.id] = now_s + self._clock.rest_s
-        await self._write(replace(run, state=state, cause=Cause.REFUSED.value, why=why))
-        self._write_down(schedule, run, "refused", why)
 
     async def _wait(self, schedule: Schedule, due: Occurrence, known: Run | None, why: Objection) -> None:
         if known is not None and (known.state, known.cause, known.why) == (
@@ -331,6 +359,18 @@ class NightShift:
         run = _not_ordered(schedule, missed, RunState.MISSED, why)
         await self._write(run)
         self._write_down(schedule, run, "missed", f"{run.day}: {why.why}")
+
+    async def _worth(self, schedule: Schedule, nodes: Sequence[str]) -> dict[str, Worth]:
+        """What a person chose goes before what is only the oldest, which is worth less from one to the next.
+        FlightdError where what they are worth cannot be known."""
+        match schedule.kept.count:
+            case CountByValue():
+                worth = worth_of(await self._facts.of(schedule.kept.site))
+                return {node: worth.get(node, UNKNOWN) for node in nodes}
+            case CountAll():
+                return {node: Worth(Value.OLD, float(len(nodes) - i)) for i, node in enumerate(nodes)}
+            case _:
+                return dict.fromkeys(nodes, Worth(Value.ASKED))
 
     def _objection(self, schedule: Schedule, drone: ScheduledDrone) -> Objection | None:
         fleet = self._fleet_of(drone)
@@ -365,13 +405,6 @@ def _not_ordered(schedule: Schedule, due: Occurrence, state: RunState, why: Obje
         cause=why.cause.value,
         why=why.why,
     )
-
-
-def _worth(schedule: Schedule, nodes: Sequence[str]) -> dict[str, Worth]:
-    """What a person chose goes before what is only the oldest, which is worth less from one to the next."""
-    if not isinstance(schedule.kept.count, CountAll):
-        return dict.fromkeys(nodes, Worth(Value.ASKED))
-    return {node: Worth(Value.OLD, float(len(nodes) - i)) for i, node in enumerate(nodes)}
 
 
 def _ns(at: datetime) -> int:

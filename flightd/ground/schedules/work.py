@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from flightd.adapters.ground_link.messages.floor import FloorNode, FloorStatus
+from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
 from flightd.core.planned_flight import MOST_NODES
 from flightd.core.utc_time import utc_time
 from flightd.fleet.schedule.rolling import NodeCount, run_nodes
+from flightd.fleet.traffic.valued_work import UNKNOWN, Worth
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.missions.mission_book import MissionBook
-from flightd.ground.schedules.kept import CountAisles, CountMission, Schedule
+from flightd.ground.schedules.kept import CountAisles, CountMission, CountOfList, Schedule
 from flightd.ground.site_stock import site_stock
+from flightd.ground.valued_nodes import shelved_nodes
 
 _MOST_RUNS = 400
 
@@ -32,11 +34,15 @@ class Work:
 
 
 def work_of(
-    schedule: Schedule, floor: FloorStatus, missions: MissionBook, store: GroundStore | None, now: datetime
+    schedule: Schedule,
+    count: CountOfList,
+    floor: FloorStatus,
+    missions: MissionBook,
+    store: GroundStore | None,
+    now: datetime,
 ) -> Work:
-    """What a run of the schedule counts now; reads files.  InputError where that is nothing, or cannot be
-    known."""
-    count = schedule.kept.count
+    """What a run of the schedule that has this `count` counts now; reads files.  InputError where that is
+    nothing, or cannot be known."""
     if isinstance(count, CountMission):
         mission = missions.mission(count.mission)
         if mission.site != schedule.kept.site:
@@ -54,19 +60,24 @@ def work_of(
     return Work(nodes[:MOST_NODES])
 
 
+def valued_work(floor: FloorStatus, worth: Mapping[str, Worth], chosen: Collection[str]) -> Work:
+    """The nodes that were chosen by their `worth`: exceptions first, then what was never counted, then the
+    others, each in the order of the aisles.  InputError where there are none."""
+    nodes = [node.id for node in floor.nodes if node.id in chosen]
+    nodes.sort(key=lambda node: -worth.get(node, UNKNOWN).value)
+    if not nodes:
+        raise InputError("all nodes wait already, or are closed")
+    return Work(tuple(nodes[:MOST_NODES]))
+
+
 def _aisle_nodes(floor: FloorStatus, aisles: Sequence[str]) -> tuple[str, ...]:
     found: list[str] = []
     for aisle in dict.fromkeys(aisles):
-        nodes = [node.id for node in _shelved(floor) if node.aisle == aisle]
+        nodes = [node.id for node in shelved_nodes(floor) if node.aisle == aisle]
         if not nodes:
             raise InputError(f"aisle {aisle} has no node at which something is counted")
         found += nodes
     return tuple(found)
-
-
-def _shelved(floor: FloorStatus) -> Sequence[FloorNode]:
-    """The nodes that face a place; all, where the site knows no places."""
-    return [node for node in floor.nodes if node.levels] or floor.nodes
 
 
 def _counts(floor: FloorStatus, stock: Sequence[dict[str, Any]]) -> list[NodeCount]:

@@ -17,9 +17,11 @@ from flightd.adapters.ground_link.messages.answers import Welcome
 from flightd.adapters.ground_link.messages.base import Role
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import Phase
+from flightd.fleet.traffic.valued_work import PlaceFacts
+from flightd.fleet.traffic.work_queue import Value
 from flightd.ground.fleet.fleet_memory import FleetMemory
 from flightd.ground.missions.mission_book import MissionBook
-from flightd.ground.schedules.kept import CountAisles, Kept, QuietHours
+from flightd.ground.schedules.kept import CountAisles, CountByValue, Kept, QuietHours
 from flightd.ground.schedules.night_shift import NightShift, StationClock
 from flightd.ground.schedules.schedule_book import Run, RunState, ScheduleBook
 from tests.rigs.paper_drones import PaperDrone
@@ -27,6 +29,11 @@ from tests.rigs.paper_fleet import PaperFleet, fly, until
 
 NIGHTLY = Kept("hall", "Aisle A", "a", CountAisles(("A",)), "22:00", "UTC")
 AISLE = {"A1", "A2", "A3", "A4", "A5"}
+FACTS = (
+    *(PlaceFacts(node, 60.0) for node in ("A1", "A2", "A4", "A5", "B1", "B2", "B4", "B5")),
+    PlaceFacts("A3", 9e5),
+    PlaceFacts("B3", 5.0, contradicted=True),
+)
 DUE = datetime(2026, 3, 1, 22, 0, tzinfo=UTC)
 
 
@@ -73,7 +80,12 @@ class Station:
         links = {name: Link(drone) for name, drone in self.fleet.drones.items()}
         clock, own = StationClock(self.utc_ns, rest_s=0.0), self.fleet.own
         missions = MissionBook(self.folder)
-        self.shift = NightShift(self.book, missions, None, links, self, None, clock, own)  # type: ignore[arg-type]
+        self.shift = NightShift(self.book, missions, None, self, links, self, None, clock, own)  # type: ignore[arg-type]
+
+    async def of(self, site: str) -> tuple[PlaceFacts, ...]:
+        """What is known of the places."""
+        assert site == "hall"
+        return FACTS
 
     def utc_ns(self) -> int:
         return int(self.now.timestamp()) * 10**9
@@ -211,6 +223,37 @@ def test_levels_are_refused_for_a_fleet_counts_all(tmp_path: Path) -> None:
         assert "counts all levels" in run.why
 
     night(tmp_path, go, Kept("hall", "A", "a", CountAisles(("A",), (1,)), "22:00", "UTC"))
+
+
+def test_what_is_worth_most_is_given_with_its_value_and_what_waits_or_is_closed_is_left_out(
+    tmp_path: Path,
+) -> None:
+    async def go(station: Station) -> None:
+        fleet = station.fleet
+        for drone in fleet.drones.values():
+            drone.left_s = 30.0  # nobody flies
+
+        async def given(days: int) -> Run:
+            run = await station.look(DUE + timedelta(days=days))
+            assert run is not None
+            if run.nodes:
+                await until(lambda: fleet.own.knows_run(run.plan), 30)
+                await station.look(DUE + timedelta(days=days))
+            return run
+
+        assert (await given(0)).nodes == ("B3", "A3")
+        kept = FleetMemory(tmp_path).read()
+        assert kept is not None
+        values = {work.node: work.value for work in kept[1].work.work}
+        assert values == {"B3": Value.CONTRADICTED, "A3": Value.OLD}
+        await fleet.own.close("ann", aisle="A")
+        later = [(await given(days)).nodes for days in (1, 2, 3)]
+        assert later == [("A1", "B1"), ("B2", "B4"), ("B5",)], "what leads to a pad is open"
+        run = await given(4)
+        assert (run.state, run.cause) == (RunState.WAITING, "work")
+        assert run.why == "all nodes wait already, or are closed"
+
+    night(tmp_path, go, Kept("hall", "Most valuable", "a", CountByValue(nodes=2), "22:00", "UTC"))
 
 
 @pytest.mark.parametrize("change", [datetime(2026, 3, 29, tzinfo=UTC), datetime(2026, 10, 25, tzinfo=UTC)])

@@ -23,10 +23,11 @@ from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.fleet.schedule.rolling import NodeCount, run_nodes
+from flightd.fleet.traffic.valued_work import PlaceFacts
 from flightd.ground.access.roles import Identity
 from flightd.ground.messages import Act
 from flightd.ground.missions.mission_book import Mission, MissionBook
-from flightd.ground.schedules.kept import CountAisles, CountAll, CountMission, Kept
+from flightd.ground.schedules.kept import CountAisles, CountAll, CountByValue, CountMission, Kept
 from flightd.ground.schedules.night_shift import NightShift, StationClock
 from flightd.ground.schedules.schedule_book import FILE, Run, RunState, ScheduleBook
 from flightd.ground.schedules.start_rules import Cause, objection
@@ -130,11 +131,29 @@ class Drone:
             raise UnavailableError("no answer")
 
 
+class Facts:
+    """What is known of places; without any there is no ground store."""
+
+    def __init__(self, *places: PlaceFacts) -> None:
+        self._places = places
+        self.asked = 0
+
+    async def of(self, site: str) -> Sequence[PlaceFacts]:
+        assert site == "demo"
+        self.asked += 1
+        if not self._places:
+            raise InputError("there is no ground store")
+        return self._places
+
+
 class Station:
     """A night shift over a file, with a clock that a test sets."""
 
-    def __init__(self, folder: Path, kept: Kept = NIGHTLY, rest_s: float = 30.0) -> None:
+    def __init__(
+        self, folder: Path, kept: Kept = NIGHTLY, rest_s: float = 30.0, facts: Facts | None = None
+    ) -> None:
         self.rest_s = rest_s
+        self.facts = facts or Facts()
         self.folder = folder
         self.now = T0
         self.book = ScheduleBook(folder)
@@ -152,8 +171,8 @@ class Station:
 
     def reboot(self) -> None:
         clock = StationClock(self._ns, rest_s=self.rest_s)
-        drones = {"demo": self.drone}
-        self._shift = NightShift(self.book, MissionBook(self.folder), None, drones, self, clock=clock)
+        drones, missions = {"demo": self.drone}, MissionBook(self.folder)
+        self._shift = NightShift(self.book, missions, None, self.facts, drones, self, clock=clock)
 
     def at(self, text: str) -> Station:
         self.now = datetime.fromisoformat(f"2026-03-{text}").replace(tzinfo=UTC)
@@ -316,7 +335,7 @@ def test_sites_keys_managers_and_people_come_before_the_drone() -> None:
 
 
 def test_a_kept_mission_is_flown_as_it_is_then_and_knows_what_is_left(tmp_path: Path) -> None:
-    station = Station(tmp_path, msgspec.structs.replace(NIGHTLY, count=CountMission("mission-1")))
+    station = Station(tmp_path, msgspec.structs.replace(NIGHTLY, count=CountMission("mission-1")), rest_s=0.0)
     run = station.at("01T22:00").look()
     assert run is not None
     assert (run.cause, run.why) == ("work", "there is no such mission any more")
@@ -331,6 +350,41 @@ def test_all_of_a_site_needs_the_ground_store(tmp_path: Path) -> None:
     run = Station(tmp_path, msgspec.structs.replace(NIGHTLY, count=CountAll(7))).at("01T22:00").look()
     assert run is not None
     assert (run.cause, run.why.partition(",")[0]) == ("work", "all of a site is counted by the ground store")
+
+
+@pytest.mark.parametrize(
+    ("asked", "nodes"),
+    [
+        (CountByValue(nodes=4), ("A5", "A2", "B6", "A4")),
+        (CountByValue(aisles=1), ("A5", "A2", "A1", "A3", "A4", "A6")),
+        (CountByValue(), ("A5", "A2", "B6", "A1", "A3", "A4", "A6", "B1", "B2", "B3", "B4", "B5")),
+    ],
+)
+def test_what_is_worth_most_is_counted_exceptions_first(
+    tmp_path: Path, asked: CountByValue, nodes: tuple[str, ...]
+) -> None:
+    old = [PlaceFacts(node.id, 60.0) for node in FLOOR.nodes if node.id not in {"A2", "A4", "A5", "B6"}]
+    exceptions = PlaceFacts("B6", None), PlaceFacts("A2", None), PlaceFacts("A5", 5.0, contradicted=True)
+    facts = Facts(*old, *exceptions, PlaceFacts("A4", 9e5))
+    station = Station(tmp_path, msgspec.structs.replace(NIGHTLY, count=asked), facts=facts)
+    run = station.at("01T22:00").look()
+    assert run is not None
+    assert (run.state, run.nodes) == (RunState.STARTED, nodes)
+
+
+def test_what_cannot_be_known_of_value_is_told_and_asked_for_again_after_a_rest(tmp_path: Path) -> None:
+    station = Station(tmp_path, msgspec.structs.replace(NIGHTLY, count=CountByValue(nodes=2)))
+    for _ in range(3):
+        run = station.at("01T22:00").look()
+        assert run is not None
+        assert (run.state, run.cause, run.why) == (RunState.WAITING, "work", "there is no ground store")
+    assert station.facts.asked == 1
+
+
+def test_how_much_is_worth_most_is_said_once() -> None:
+    both = msgspec.structs.replace(NIGHTLY, count=CountByValue(nodes=2, aisles=1))
+    with pytest.raises(InputError, match="nodes and aisles are given; leave one out"):
+        both.checked()
 
 
 def test_a_week_of_nights_counts_all_nodes_with_exceptions_first_and_none_gets_older() -> None:

@@ -22,6 +22,7 @@ from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.stores import Stores
+from flightd.ground.valued_nodes import ByValue
 from flightd.inventory.stock_columns import StockColumns
 from tests.rigs.event_loops import real
 from tests.rigs.paper_fleet import PaperFleet, fly, until
@@ -111,8 +112,8 @@ def test_without_a_ground_store_nothing_is_said_of_value() -> None:
 
 def test_the_most_valuable_nodes_are_visited_and_what_waits_is_not_asked_for_twice() -> None:
     async def go(fleet: PaperFleet) -> None:
-        assert fleet.own.ask_by_value(WORTH, nodes=2) == ("B4", "B3")
-        assert fleet.own.ask_by_value(WORTH, nodes=1) == ("A3",), "those wait already"
+        assert fleet.own.ask_by_value(WORTH, ByValue(nodes=2)) == ("B4", "B3")
+        assert fleet.own.ask_by_value(WORTH, ByValue(nodes=1)) == ("A3",), "those wait already"
         await until_done(fleet, "B4 B3 A3")
 
     fly(go)
@@ -121,7 +122,7 @@ def test_the_most_valuable_nodes_are_visited_and_what_waits_is_not_asked_for_twi
 def test_one_drone_alone_flies_all_by_value_aisle_by_aisle() -> None:
     async def go(fleet: PaperFleet) -> None:
         a = fleet.drones["a"]
-        asked = fleet.own.ask_by_value(WORTH)
+        asked = fleet.own.ask_by_value(WORTH, ByValue())
         assert asked[:3] == ("B4", "B3", "A3")
         assert set(asked) == set(WORTH)
         await until(lambda: a.phase is Phase.DONE, 400)
@@ -134,7 +135,7 @@ def test_one_drone_alone_flies_all_by_value_aisle_by_aisle() -> None:
 def test_an_aisle_that_is_closed_is_none_of_the_most_valuable(tmp_path: Path) -> None:
     async def go(fleet: PaperFleet) -> None:
         await fleet.own.close("ann", aisle="B")
-        assert set(fleet.own.ask_by_value(WORTH, aisles=1)) == {"A1", "A2", "A3", "A4", "A5"}
+        assert set(fleet.own.ask_by_value(WORTH, ByValue(aisles=1))) == {"A1", "A2", "A3", "A4", "A5"}
 
     fly(go, "ab", memory=FleetMemory(tmp_path))
 
@@ -143,7 +144,7 @@ def test_the_next_station_knows_the_value_of_what_waits(tmp_path: Path) -> None:
     async def go(fleet: PaperFleet) -> None:
         for drone in fleet.drones.values():
             drone.never_starts = True
-        fleet.own.ask_by_value(WORTH, nodes=3)
+        fleet.own.ask_by_value(WORTH, ByValue(nodes=3))
         await asyncio.sleep(5.0)
         await fleet.kill()
         kept = FleetMemory(tmp_path).read()

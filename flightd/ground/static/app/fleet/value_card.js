@@ -1,4 +1,4 @@
-// Work by its value: nobody says which nodes, only how many of the most valuable, or all.
+// Nobody says which nodes, only how many of the most valuable, or all.
 import { html, useState } from "../html.js";
 import { quoted, say } from "../language.js";
 import { askByValue, fleet } from "./fleet_state.js";

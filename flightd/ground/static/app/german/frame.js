@@ -5,6 +5,8 @@ export default {
   "the ground station does not answer": "die Bodenstation antwortet nicht",
   "Sign in": "Anmelden",
   "Name": "Name",
+  "Work by value": "Arbeit nach Wert",
+  "How many": "Wie viele",
   "The page cannot be shown": "Die Seite kann nicht gezeigt werden",
   "It failed: {text}.": "Sie ist gescheitert: {text}.",
   "Try again": "Noch einmal versuchen",

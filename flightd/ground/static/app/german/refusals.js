@@ -691,7 +691,7 @@ export default {
   "start it with --fleet": "starten Sie sie mit --fleet",
   "a tour": "eine Tour",
   "work by value": "Arbeit nach Wert",
-  "so many nodes are asked for, or so many aisles": "gefragt wird nach so vielen Knoten oder so vielen Gängen",
+  "all nodes wait already, or are closed": "alle Knoten warten schon oder sind gesperrt",
   "how old counts are is in the ground store, and there is none": "wie alt Zählungen sind, steht im Bodenspeicher, und es gibt keinen",
   "no node is called {name}": "kein Knoten heißt {name}",
   "{why}, but on another map ({file})": "{why}, aber auf einer anderen Karte ({file})",

@@ -1,4 +1,4 @@
-// The missions that are kept under names: opened, renamed, duplicated, deleted; and what was cut, flown on.
+// The missions that are kept under names.
 import { mayOperate } from "../access/session.js";
 import { html, useState } from "../html.js";
 import { dateFormat, english, quoted, say, sayWith } from "../language.js";

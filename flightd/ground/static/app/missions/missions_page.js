@@ -1,4 +1,4 @@
-// The page Missions: choose what to fly, see what it takes, keep it, fly it, and fly the rest of what was cut.
+// The page Missions: choose what to fly, see what it takes, keep it, fly it.
 import { html, useEffect } from "../html.js";
 import { say } from "../language.js";
 import { shown, state } from "../store.js";

@@ -1,16 +1,16 @@
-// A new schedule for the drone that is shown: what is counted, on which days, from when, and when nothing starts.
+// A new schedule for the drone that is shown.
 import { html, useState } from "../html.js";
 import { say } from "../language.js";
 import { state } from "../store.js";
 import { keepSchedule } from "./schedules_source.js";
 import { WEEKDAYS, weekdayName } from "./weekdays.js";
 
-const ALL = "all";
+const ALL = "all", VALUE = "value";
 
 export function ScheduleForm({ floor, kept, onKept }) {
   const aisles = [...new Set(floor.nodes.map(({ aisle }) => aisle))].filter(Boolean);
   const [given, setGiven] = useState({
-    name: "", count: aisles.length ? `aisles ${aisles[0]}` : ALL, within: "7", days: [], at: "22:00", late: "120", begin: "", end: "",
+    name: "", count: aisles.length ? `aisles ${aisles[0]}` : ALL, within: "7", most: "20", days: [], at: "22:00", late: "120", begin: "", end: "",
     zone: Intl.DateTimeFormat().resolvedOptions().timeZone,
   });
   const set = (key) => (event) => setGiven({ ...given, [key]: event.target.value });
@@ -31,9 +31,11 @@ export function ScheduleForm({ floor, kept, onKept }) {
           ${aisles.map((aisle) => html`<option key=${aisle} value=${`aisles ${aisle}`}>${say("Aisle {aisle}", { aisle })}</option>`)}
           ${kept.map(({ id, name }) => html`<option key=${id} value=${`mission ${id}`}>${name}</option>`)}
           <option value=${ALL}>${say("All of the site, exceptions first")}</option>
+          <option value=${VALUE}>${say("Work by value")}</option>
         </select>
       </label>
       ${given.count === ALL && input("within", say("Each place within days"), { type: "number", min: 1, max: 366 })}
+      ${given.count === VALUE && input("most", say("How many"), { type: "number", min: 1, max: 500 })}
       <div class="choose-row" role="group" aria-label=${say("Days of the week; none: every day")}>
         ${WEEKDAYS.map((day) => html`<button type="button" class="pick" key=${day} aria-pressed=${given.days.includes(day)} onClick=${() => turn(day)}>${weekdayName(day)}</button>`)}
       </div>
@@ -47,9 +49,9 @@ export function ScheduleForm({ floor, kept, onKept }) {
   `;
 }
 
-function keptOf({ name, count, within, days, at, zone, late, begin, end }) {
+function keptOf({ name, count, within, most, days, at, zone, late, begin, end }) {
   const [kind, what] = count.split(" ");
-  const counts = { aisles: { aisles: [what] }, mission: { mission: what }, all: { within_days: Number(within) } };
+  const counts = { aisles: { aisles: [what] }, mission: { mission: what }, all: { within_days: Number(within) }, value: { nodes: Number(most) } };
   return {
     name, at, zone, weekdays: days, late_minutes: Number(late), count: { kind, ...counts[kind] },
     quiet: begin && end ? [{ begin, end }] : [],

@@ -1,4 +1,4 @@
-// Schedules: flights that the station starts by itself, what comes next, and what became of the newest run.
+// Flights that the station starts by itself.
 import { mayOperate } from "../access/session.js";
 import { html, useState } from "../html.js";
 import { dateFormat, quoted, say, sayWith } from "../language.js";
@@ -57,6 +57,7 @@ function Row({ schedule, kept }) {
 function countWords({ count }, kept) {
   if (count.kind === "mission") return kept.find(({ id }) => id === count.mission)?.name ?? say("a mission that is not kept any more");
   if (count.kind === "aisles") return say("aisles {aisles}", { aisles: count.aisles.join(", ") });
+  if (count.kind === "value") return say("Work by value");
   return say("all within {n} day, exceptions first|all within {n} days, exceptions first", { n: count.within_days });
 }
 
