@@ -361,6 +361,11 @@ class OwnFleet(VehicleSides):
             traffic.ask_worth(worth)
             self._runs = (*self._runs, run)[-_MOST_RUNS:]
 
+    def left_of(self, nodes: Sequence[str]) -> tuple[str, ...]:
+        """Which of these it has not visited, or was asked for since."""
+        done = {*self._queue.done}
+        return tuple(node for node in nodes if node not in done)
+
     def _asked_traffic(self) -> StationTraffic:
         """Of which a person asks something: drones may leave the ground for it."""
         traffic = self._flying()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from flightd.adapters.ground_link.messages.answers import Welcome
@@ -49,6 +49,10 @@ class ScheduledFleet(Protocol):
     def take_run(self, run: str, worth: Mapping[str, Worth]) -> None:
         """Have the nodes of a run visited, once; `knows_run` says when that is written down.  InputError for
         a node that is not there, UnavailableError where the fleet does not fly."""
+        ...
+
+    def left_of(self, nodes: Sequence[str]) -> tuple[str, ...]:
+        """Which of these it has not visited, or was asked for since."""
         ...
 
 

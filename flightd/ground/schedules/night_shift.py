@@ -136,6 +136,8 @@ class NightShift:
         self._clock = clock
         self._threads = Threads(_AT_ONCE, _MOST_WAITING, "the schedules are being looked at already")
         self._trouble: dict[str, str] = {}
+        self._left: dict[str, tuple[str, tuple[str, ...]]] = {}
+        """Of each schedule of a mission that the fleet has: the plan of its newest run, and the nodes."""
         self._rests: dict[str, float] = {}
         """Until when nothing is ordered for a schedule, by the loop's clock: its drone has just refused, or
         what it counts could not be known."""
@@ -182,6 +184,9 @@ class NightShift:
         runs = {
             run.day: run for run in await self._threads.run(self._book.runs, schedule.id, MOST_RUNS, oldest)
         }
+        started = [run for run in runs.values() if run.state is RunState.STARTED]
+        if started and isinstance(schedule.kept.count, CountMission):
+            await self._note_left(schedule, max(started, key=lambda run: run.day))
         unanswered = [run for run in runs.values() if run.state is RunState.ORDERED]
         for run in unanswered:
             await self._resume(schedule, run, now)
@@ -274,6 +279,7 @@ class NightShift:
                 await self._refused(schedule, run, RunState.WAITING, str(err))
                 return
         if fleet.knows_run(run.plan):
+            await self._mark(schedule, run.plan, run.nodes)
             await self._write(replace(run, state=RunState.STARTED, cause="", why=""))
             self._write_down(schedule, run, "accepted", f"{run.day}: {', '.join(run.nodes)}")
 
@@ -326,10 +332,28 @@ class NightShift:
             return
         await self._write(replace(run, state=RunState.STARTED, nodes=planned.nodes, cause="", why=""))
         self._write_down(schedule, run, "accepted", f"{run.day}: {', '.join(planned.nodes)}")
+        await self._mark(schedule, run.plan, planned.nodes)
+
+    async def _mark(self, schedule: Schedule, plan: str, nodes: Sequence[str]) -> None:
+        """As handed over, where that is a mission."""
         count = schedule.kept.count
         if isinstance(count, CountMission):
-            flown = (count.mission, run.plan, planned.nodes, self._clock.utc_ns())
+            flown = (count.mission, plan, nodes, self._clock.utc_ns())
             await self._threads.run(self._missions.handed_over, *flown)
+
+    async def _note_left(self, schedule: Schedule, run: Run) -> None:
+        """Of a mission that the fleet has: its drones fly by other plans, and tell nothing of this one.  What
+        is asked for anew once nothing was left is none of it."""
+        drone = self._drones.get(run.drone)
+        fleet = None if drone is None or run.session else self._fleet_of(drone)
+        known = self._left.get(schedule.id)
+        is_over = known == (run.plan, ())
+        if fleet is None or is_over or not fleet.knows_run(run.plan):
+            return
+        left = run.plan, fleet.left_of(run.nodes)
+        if left != known:
+            await self._threads.run(self._missions.left, *left)
+            self._left[schedule.id] = left
 
     async def _refused(self, schedule: Schedule, run: Run, state: RunState, why: str) -> None:
         """The drone does not take it: that may change, unless another flightd answered than may have started

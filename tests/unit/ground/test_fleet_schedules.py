@@ -20,8 +20,8 @@ from flightd.core.types import Phase
 from flightd.fleet.traffic.valued_work import PlaceFacts
 from flightd.fleet.traffic.work_queue import Value
 from flightd.ground.fleet.fleet_memory import FleetMemory
-from flightd.ground.missions.mission_book import MissionBook
-from flightd.ground.schedules.kept import CountAisles, CountByValue, Kept, QuietHours
+from flightd.ground.missions.mission_book import Mission, MissionBook
+from flightd.ground.schedules.kept import CountAisles, CountByValue, CountMission, Kept, QuietHours
 from flightd.ground.schedules.night_shift import NightShift, StationClock
 from flightd.ground.schedules.schedule_book import Run, RunState, ScheduleBook
 from tests.rigs.paper_drones import PaperDrone
@@ -223,6 +223,33 @@ def test_levels_are_refused_for_a_fleet_counts_all(tmp_path: Path) -> None:
         assert "counts all levels" in run.why
 
     night(tmp_path, go, Kept("hall", "A", "a", CountAisles(("A",), (1,)), "22:00", "UTC"))
+
+
+def test_a_kept_mission_knows_when_the_fleet_had_it_and_what_is_left(tmp_path: Path) -> None:
+    missions = MissionBook(tmp_path)
+    missions.keep(Mission("mission-1", "hall", "Two", ("B3", "A3")))
+
+    async def go(station: Station) -> None:
+        fleet = station.fleet
+        run = await station.look()
+        assert run is not None
+        assert missions.mission("mission-1").flown_ns == 0, "it is not written down as given yet"
+        await until(lambda: fleet.own.knows_run(run.plan), 30)
+        await station.look()
+        told = missions.mission("mission-1")
+        assert (told.plan, told.flown_ns, told.remaining) == (run.plan, station.utc_ns(), ("B3", "A3"))
+        await until(lambda: len(fleet.state["done"]) == 1, 200)
+        (done,) = fleet.state["done"]
+        await station.look()
+        assert missions.mission("mission-1").remaining == tuple({"B3", "A3"} - {done})
+        await until(lambda: len(fleet.state["done"]) == 2, 200)
+        await station.look()
+        assert missions.mission("mission-1").remaining == ()
+        fleet.own.ask(["B3"])
+        await station.look(DUE + timedelta(hours=1))
+        assert missions.mission("mission-1").remaining == (), "what is asked for anew is none of the run's"
+
+    night(tmp_path, go, Kept("hall", "Two", "a", CountMission("mission-1"), "22:00", "UTC"))
 
 
 def test_what_is_worth_most_is_given_with_its_value_and_what_waits_or_is_closed_is_left_out(
