@@ -16,7 +16,7 @@ from flightd.adapters.ground_link.messages.base import Role
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import FlightdError, InputError, RunError, TransientError, UnavailableError
 from flightd.core.preview import CameraName
-from flightd.core.types import CommandKind
+from flightd.core.types import CommandKind, Phase
 from flightd.ground.bounded import Room, Shared
 from flightd.ground.messages import Act, LinkPicture, LinkState, PictureKey
 
@@ -40,6 +40,8 @@ _LANDED_S = 3600.0
 """No drone flies so long after it was heard last."""
 _VISITED = "visited"
 """The event of a node that was visited: its name is the text."""
+_BEGINS = f"{Phase.PREFLIGHT} -> {Phase.ARMING}:"
+"""The text of the event of a flight that begins; one that goes on with another battery does not."""
 _URGENT = frozenset({CommandKind.STOP, CommandKind.LAND})
 
 
@@ -285,7 +287,12 @@ class DroneLink:
         self._pages.tell(self.name, "events", tuple(self._events))
 
     def _note_visits(self, events: Iterable[EventReport]) -> None:
-        self._visited |= {event.text: None for event in events if event.name == _VISITED}
+        """Of the newest flight: a drone may fly several while its daemon runs."""
+        for event in events:
+            if event.name == "phase" and event.text.startswith(_BEGINS):
+                self._visited.clear()
+            elif event.name == _VISITED:
+                self._visited[event.text] = None
         self._pages.tell(self.name, "visited", tuple(self._visited))
 
     def _take_status(self, report: StatusReport) -> None:

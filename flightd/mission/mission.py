@@ -435,8 +435,8 @@ class Mission:
         if self._scan.blind is not None:
             self._events.report(s.now_ns, EventLevel.ERROR, "not_counted", in_words(self._scan.blind))
         self._scan.count_anew()
-        self._charging.begin_anew()
         self._route.begin(self._plan.begin_at(goal.node, goal.yaw_rad))
+        self._charging.begin_anew()  # nothing is done yet
 
     def _go_on(self, s: MissionInputs) -> None:
         """To the next stop, which is the way back where the battery does not reach another one."""

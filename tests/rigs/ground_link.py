@@ -135,5 +135,5 @@ def tell_once(
     link.tell(replace(told, possible=possible))
 
 
-def event(text: str) -> Event:
-    return Event(LoopClock().now_ns(), EventLevel.WARNING, "test", text)
+def event(text: str, name: str = "test") -> Event:
+    return Event(LoopClock().now_ns(), EventLevel.WARNING, name, text)

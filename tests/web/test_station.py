@@ -61,6 +61,27 @@ async def test_a_page_is_told_all_that_the_link_says_and_its_acts_reach_the_flig
         assert [command.kind for command in link.take_commands()] == [CommandKind.PAUSE]
 
 
+@pytest.mark.parametrize("live", [False, True])
+@in_real_time
+async def test_the_nodes_that_are_told_as_visited_are_those_of_the_newest_flight(live: bool) -> None:
+    begins = event("preflight -> arming: started", name="phase")
+    first = (begins, event("A2", name="visited"), event("follow -> hover: there", name="phase"))
+    swapped = event("swap -> arming: a fresh battery", name="phase")
+    second = (begins, event("A3", name="visited"), swapped, event("A4", name="visited"))
+    async with serving(local()) as link, contextlib.AsyncExitStack() as stack:
+        for one in () if live else (*first, *second):
+            link.event(one)
+        station = await stack.enter_async_context(served(("demo", address_of(link))))
+        await stack.enter_async_context(telling(link))
+        page = await stack.enter_async_context(station.page())
+        if live:
+            await told(page, "status")
+            for one in (*first, *second):
+                link.event(one)
+        while (visited := await told(page, "visited")) != ["A3", "A4"]:
+            assert visited in ([], ["A2"], ["A3"])
+
+
 async def answered(page: ClientConnection, number: int, act: object, drone: str = "demo") -> dict[str, Any]:
     """What the station answers to an act that the page sends over its WebSocket."""
     await page.send(json.dumps({"say": "act", "number": number, "drone": drone, "act": act}))

@@ -48,8 +48,8 @@ class Itinerary:
         """Whether anything is left to count at a node."""
 
     def begin(self, plan: FlightPlan) -> None:
-        """Fly this plan instead, on the ground."""
-        self._stops, self._next, self._run = list(plan.stops), 0, ()
+        """Fly this plan instead, on the ground; nothing of it is visited yet."""
+        self._stops, self._next, self._run, self.visited = list(plan.stops), 0, (), []
         self.stand = (plan.start, plan.start_yaw_rad)
         self._waits, self._left_over, self._told_pad = plan.waits, (), ""
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from flightd.config.battery import BatteryConfig
 from flightd.config.scan import ScanConfig
 from flightd.core.errors import InputError
 from flightd.core.types import CommandKind, Phase
@@ -24,9 +25,9 @@ DOCK = Pad("dock", "A3", 0.5, start=False, shared=True)
 HALL = replace(shelves.SITE, pads=(*shelves.SITE.pads, DOCK))
 
 
-def flown(site: Site = HALL, scanner: AnyScanner = NO_SCAN) -> Flight:
+def flown(site: Site = HALL, scanner: AnyScanner = NO_SCAN, battery: BatteryConfig | None = None) -> Flight:
     """A flight that holds over A2."""
-    flight = Flight(configured(dwell_s=0.5, autostart=False), site, scanner)
+    flight = Flight(configured(battery, dwell_s=0.5, autostart=False), site, scanner)
     flight.run(0.2)
     flight.order(PLAN, nodes=("A2",), waits=True)
     start(flight)
@@ -60,6 +61,29 @@ def test_it_waits_on_the_pad_that_it_was_told_and_flies_on_from_there() -> None:
     flight.order(HOME)
     assert lands_at(flight) == HALL.home.node
     assert flight.land() is Phase.ABORTED
+
+
+def test_each_flight_counts_its_own_nodes() -> None:
+    flight = flown()
+    assert list(flight.mission.visited) == ["A2"]
+    flight.order(GOTO, "A3", lands=True)
+    assert flight.land() is Phase.PREFLIGHT
+    assert list(flight.mission.visited) == []
+    flight.order(PLAN, nodes=("A4", "A2"), waits=True)
+    start(flight)
+    flight.to(Phase.HOLD, 120.0)
+    assert list(flight.mission.visited) == ["A4", "A2"]
+
+
+def test_what_an_earlier_flight_visited_is_nothing_done_on_the_battery_in_hand() -> None:
+    flight = flown(battery=BatteryConfig(swap=True))
+    flight.order(GOTO, "A3", lands=True)
+    assert flight.land() is Phase.PREFLIGHT
+    flight.order(PLAN, nodes=("A2", "A4"))
+    start(flight)
+    flight.run(120.0, until=lambda: len(flight.mission.visited) == 1)
+    flight.set(battery_frac=0.15)
+    assert flight.land() is Phase.SWAP
 
 
 def test_where_it_holds_already_it_comes_down() -> None:
