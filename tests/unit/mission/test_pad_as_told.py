@@ -73,6 +73,8 @@ def test_each_flight_counts_its_own_nodes() -> None:
     start(flight)
     flight.to(Phase.HOLD, 120.0)
     assert list(flight.mission.visited) == ["A4", "A2"]
+    begun = [event.text for event in flight.mission.drain_events() if event.name == "phase"]
+    assert sum(text.startswith("preflight -> arming:") for text in begun) == 2, "by that a station knows"
 
 
 def test_what_an_earlier_flight_visited_is_nothing_done_on_the_battery_in_hand() -> None:
