@@ -231,6 +231,8 @@ def test_a_kept_mission_knows_when_the_fleet_had_it_and_what_is_left(tmp_path: P
 
     async def go(station: Station) -> None:
         fleet = station.fleet
+        fleet.own.hand_over("b", to_manager=False)  # a flies to one after the other
+        await asyncio.sleep(5.0)
         run = await station.look()
         assert run is not None
         assert missions.mission("mission-1").flown_ns == 0, "it is not written down as given yet"
@@ -240,8 +242,11 @@ def test_a_kept_mission_knows_when_the_fleet_had_it_and_what_is_left(tmp_path: P
         assert (told.plan, told.flown_ns, told.remaining) == (run.plan, station.utc_ns(), ("B3", "A3"))
         await until(lambda: len(fleet.state["done"]) == 1, 200)
         (done,) = fleet.state["done"]
+        fleet.deciding = asyncio.Event()  # nothing more is done while it is looked at
         await station.look()
         assert missions.mission("mission-1").remaining == tuple({"B3", "A3"} - {done})
+        fleet.deciding.set()
+        fleet.deciding = None
         await until(lambda: len(fleet.state["done"]) == 2, 200)
         await station.look()
         assert missions.mission("mission-1").remaining == ()
