@@ -22,6 +22,7 @@ from flightd.core.geometry import Matrix
 from flightd.core.learnt import LearntSensors
 from flightd.core.tracks import SensorEstimate
 from flightd.tracking.first_doubt import LEAST_HEIGHT_SHARE, drift_of, first_sigmas
+from flightd.tracking.forgotten_lines import FEATURE_NS, forgotten_features, forgotten_lines
 from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, placed
 from flightd.tracking.held_lines import SURE_HITS, HeldLine, associate, refound
 from flightd.tracking.innovations import Innovations
@@ -67,9 +68,8 @@ _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
 _OUTLIER_SIGMAS = 3.0
 """What errs by more is weighed less (Huber)."""
-_FEATURES, _FRESH, _TELLING, _FEATURE_SIGMAS, _FEATURE_NS = 6, 3, 2, 4.0, 500_000_000
-"""So many features are held across an axis, those seen last, since several detectors take turns; so many are
-followed from one frame, so many tell the motion; none that errs by more, or is not seen for so long."""
+_FRESH, _TELLING, _FEATURE_SIGMAS = 3, 2, 4.0
+"""So many features are followed from one frame, so many tell the motion; none that errs by more."""
 _CARRIED_M = 0.12
 """A line whose place features of the floor have told this well is held on, however long it is not seen."""
 _SURVEY_SIGMAS = 4.0
@@ -243,7 +243,7 @@ class FloorFilter:
         new ones.  Of an attitude that is only `assumed` nothing is learnt for good; of lines whose tilt was
         not compensated in an `exact` form nothing but the delay.  Across which axes
         features told the motion where no line did."""
-        self._forget_features(stamp_ns)
+        self._drop(forgotten_features(self.held, self._refused, stamp_ns))
         before = self._x[:FIRST_LINE].copy()
         known, fresh = associate(
             sights,
@@ -397,19 +397,6 @@ class FloorFilter:
                 self._refused.add(sight.feature)
         return known, strange
 
-    def _forget_features(self, stamp_ns: int) -> None:
-        """Drop the features that were not seen for long, turned out to be none, or are too many."""
-        old = set[int]()
-        for axis in range(2):
-            lately = [
-                line for line, held in enumerate(self.held) if held.feature is not None and held.axis == axis
-            ]
-            lately.sort(key=lambda line: -self.held[line].seen_ns)
-            old |= set(lately[_FEATURES:])
-            old |= {line for line in lately if stamp_ns - self.held[line].seen_ns > _FEATURE_NS}
-            old |= {line for line in lately if self.held[line].feature in self._refused}
-        self._drop(old)
-
     def _take(
         self, measured: FrameMeasurement, unmoved: slice | list[int] | None, *, minded: bool = True
     ) -> None:
@@ -475,22 +462,15 @@ class FloorFilter:
 
     def _forget_old(self, stamp_ns: int) -> None:
         """Drop lines that were not seen for long, but those that features have carried on well."""
-        old, lines = set[int](), list[int]()
-        for line, held in enumerate(self.held):
-            if held.feature is not None:
-                continue
-            lines.append(line)
-            unseen_ns = stamp_ns - held.seen_ns
-            lost = held.is_lost(stamp_ns)
-            if lost:
+
+        def is_carried(line: int) -> bool:
+            carried = stamp_ns - self._followed_ns[self.held[line].axis] <= FEATURE_NS
+            return carried and self.offset(line)[1] < _CARRIED_M
+
+        for held in self.held:
+            if held.feature is None and held.is_lost(stamp_ns):
                 held.from_m = held.to_m = 0.0  # where it was in view is no longer known
-            carried = stamp_ns - self._followed_ns[held.axis] <= _FEATURE_NS
-            held_on = carried and self.offset(line)[1] < _CARRIED_M
-            glimpsed = lost and held.hits < SURE_HITS
-            if glimpsed or (unseen_ns > self._forget_ns and not held_on):
-                old.add(line)
-        lines.sort(key=lambda line: -self.held[line].seen_ns)
-        self._drop(old | set(lines[self._max_lines :]))
+        self._drop(forgotten_lines(self.held, is_carried, self._forget_ns, self._max_lines, stamp_ns))
 
     def _drop(self, lines: set[int] | range) -> None:
         if not lines:
