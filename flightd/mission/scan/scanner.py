@@ -24,6 +24,7 @@ from flightd.mission.scan.code_identity import names_one_thing
 from flightd.mission.scan.face_light import USUAL, Face, FaceLight, LegLight
 from flightd.mission.scan.label_checks import LabelChecks
 from flightd.mission.scan.node_scan import ScanTask
+from flightd.mission.scan.passing_time import PassingTime
 from flightd.mission.scan.pending_findings import PendingFindings
 from flightd.mission.scan.sweep_planner import SweepPlanner, told
 from flightd.mission.scan.sweep_speed import SweepOptics
@@ -53,17 +54,17 @@ class Scanner:
         self._site = site
         self._assigner = Assigner(site, sight, params.expert.least_probability)
         self._planner = ViewPlanner(site, sight, self._assigner, params, highest_m, aside_per_height)
+        self._node_of = {location.code: location.node for location in site.locations.values()}
         self._sweeps: SweepPlanner | None = None
+        self._passing_time: PassingTime | None = None
         if optics is not None:
             self._sweeps = SweepPlanner(site, self._planner, self._assigner, optics)
+            self._passing_time = PassingTime(self._sweeps, self._node_of)
         self._sweep: SweepTask | None = None
         self._light = FaceLight(params.expert.darker, params.expert.brighter, params.sweep.most_gain)
         self._shot = USUAL
         self._swept: set[str] = set()
-        self._shared_of: tuple[str, frozenset[str], Pace] | None = None
-        self._shared_s: dict[str, float] = {}
         self._owners: dict[str, str] = {}
-        self._node_of = {location.code: location.node for location in site.locations.values()}
         self._aisle_of = {node.id: node.aisle for node in site.nodes.values()}
         self._planned = self._wanted = frozenset(site.locations)
         self._levels = {location.code: location.level for location in site.locations.values()}
@@ -476,20 +477,14 @@ class Scanner:
 
     def _passed_s(self, node: str, pace: Pace, levels: Sequence[int] | None) -> float:
         """A node's share of the time in which its aisle is counted in passing; 0 where it is not."""
-        if self._sweeps is None:
+        if self._passing_time is None:
             return 0.0
         aisle = self._aisle_of[node]
         nodes = [other for other, of in self._aisle_of.items() if of == aisle]
         left = {code for other in nodes for code in self._left(other)} - self._swept
         if levels:
             left = {code for code in left if self._levels[code] in levels}
-        of_aisle = aisle, frozenset(left), pace
-        if of_aisle != self._shared_of:  # asked of one node of an aisle after the other
-            legs = self._sweeps.legs(nodes, frozenset(left), nodes[0], 0.0, pace.height_m)
-            counted = {self._node_of[code] for leg in legs for code in leg.locations}
-            share_s = self._sweeps.seconds(legs, pace, 0.0) / max(len(counted), 1)
-            self._shared_of, self._shared_s = of_aisle, dict.fromkeys(counted, share_s)
-        return self._shared_s.get(node, 0.0)
+        return self._passing_time.share_s(node, nodes, frozenset(left), pace)
 
 
 def _faces(leg: SweepLeg) -> list[Face]:
