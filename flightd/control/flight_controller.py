@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from flightd.config.control import ControlConfig
 from flightd.control.pid import Pid
@@ -47,6 +47,13 @@ class Reference:
     ay_mps2: float = 0.0
     yaw_rate_radps: float = 0.0
     climb_mps: float = 0.0
+
+    def after(self, ahead_s: float) -> Reference:
+        """Where on the floor, and how fast there, it is wanted so much later."""
+        vx_mps, vy_mps = self.vx_mps + self.ax_mps2 * ahead_s, self.vy_mps + self.ay_mps2 * ahead_s
+        x_m = self.x_m + 0.5 * (self.vx_mps + vx_mps) * ahead_s
+        y_m = self.y_m + 0.5 * (self.vy_mps + vy_mps) * ahead_s
+        return replace(self, x_m=x_m, y_m=y_m, vx_mps=vx_mps, vy_mps=vy_mps)
 
 
 @dataclass(frozen=True, slots=True)

@@ -126,6 +126,7 @@ def sensor_rows(found: FittedSensors, camera: CameraConfig, online: SensorEstima
             camera.fx_px,
             camera.fx_px * math.expm1(focal),
             camera.fx_px * focal_sigma,
+            seen=(camera.fx_px * (1.0 / (1.0 + online.scale_share) - 1.0), camera.fx_px * online.scale_sigma),
             note="if the range finder is right",
         ),
         row(
@@ -136,7 +137,6 @@ def sensor_rows(found: FittedSensors, camera: CameraConfig, online: SensorEstima
             1.0,
             math.expm1(-focal),
             focal_sigma,
-            seen=(online.scale_share, online.scale_sigma),
             note="if camera.fx_px is right: pictures tell height and focal length only together",
         ),
         row(

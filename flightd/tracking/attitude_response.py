@@ -126,7 +126,8 @@ class AttitudeResponse:
         if setpoint is not None:
             self._move((now_ns - last_ns) * 1e-9, setpoint)
         elif told is not None:
-            self._answer[:, 0], self._answer[:, 1] = told.roll_rad, told.pitch_rad
+            self._wanted = np.array([told.roll_rad, told.pitch_rad])
+            self._answer[:, _TILT] = self._wanted
             self._speed[:] = 0.0
         self._kept.add(now_ns, self._answer)
 

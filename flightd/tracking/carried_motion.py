@@ -9,16 +9,17 @@ from flightd.core.types import Attitude
 
 class Lead(NamedTuple):
     """What the motion changes by until a setpoint that goes out now has most of its effect: way and speed
-    along the grid axes, and the heading."""
+    along the grid axes, and the heading; that is `after_s` from now."""
 
     x_m: float
     y_m: float
     vx_mps: float
     vy_mps: float
     yaw_rad: float
+    after_s: float
 
 
-NO_LEAD = Lead(0.0, 0.0, 0.0, 0.0, 0.0)
+NO_LEAD = Lead(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class ExposureMotion(NamedTuple):

@@ -64,6 +64,7 @@ _BUT_MOTION = [PSI, PSI_RATE, *range(LEAK, FIRST_LINE)]
 _DIAGONAL = np.diag_indices(FIRST_LINE)
 _MOST_HEIGHT_SHARE = 0.05
 _MOST_LEAK_PER_S = 1.0
+_MOST_SCALE = 0.5
 _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
 _OUTLIER_SIGMAS = 3.0
@@ -416,6 +417,7 @@ class FloorFilter:
         delay_s = _MOST_SIGMAS * self._priors.delay_s
         self._bound_push()
         self._bound(LEAK, 0.0, _MOST_LEAK_PER_S)
+        self._bound(SCALE, -_MOST_SCALE, _MOST_SCALE)
         self._bound(DELAY, -delay_s, min(delay_s, self._latency_s))  # no frame arrives before it is exposed
         if minded:
             self._mind(errors / np.sqrt(np.diag(spread)), measured.axes)

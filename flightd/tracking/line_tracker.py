@@ -246,7 +246,7 @@ class LineTracker:
         velocity = held.mean(VX), held.mean(VY)
         yaw = attitude.yaw_rad + held.mean(PSI)
         motion = ImageMotion.of(self._rates(stamp_ns), velocity, yaw, height_m, self._corrected_mount())
-        return as_of_one_moment(lines, self._lens, motion, self._readout_s)
+        return as_of_one_moment(lines, self._corrected_lens(), motion, self._readout_s)
 
     def exposure_motion(self, now_ns: int) -> ExposureMotion | None:
         """What the newest frame tells of the motion; None where it was laid over an attitude that was only
@@ -317,7 +317,8 @@ class LineTracker:
             return NO_LEAD._replace(yaw_rad=wrap_pi(yaw_then - yaw_now))
         vx, vy = self._carried_to(now_ns)[:2]
         then_vx, then_vy, moved_x, moved_y = self._carried(now_ns, then_ns, vx, vy)[:4]
-        return Lead(moved_x, moved_y, then_vx - vx, then_vy - vy, wrap_pi(yaw_then - yaw_now))
+        turned, after_s = wrap_pi(yaw_then - yaw_now), (then_ns - now_ns) * 1e-9
+        return Lead(moved_x, moved_y, then_vx - vx, then_vy - vy, turned, after_s)
 
     def unleant(self, now_ns: int) -> tuple[float, float]:
         """Acceleration along the grid axes (m/s2) that the told lean does not explain: push of the air and
@@ -420,8 +421,12 @@ class LineTracker:
         if self._history.is_assumed(stamp_ns):
             sigma_tilt_rad = _ASSUMED_TILT_RAD
         mount, corrected = self._corrected_mount(), self._corrected(attitude)
-        lens = self._lens.longer_by(1.0 / (1.0 + self._filter.mean(SCALE)))
+        lens = self._corrected_lens()
         return FloorView(lens, mount, corrected, height_m, self._compensation, sigma_tilt_rad)
+
+    def _corrected_lens(self) -> Lens:
+        """The camera's lens, by what has been learnt of its focal length."""
+        return self._lens.longer_by(1.0 / (1.0 + self._filter.mean(SCALE)))
 
     def _corrected(self, told: Attitude) -> Attitude:
         """The attitude, by what has been learnt of it."""

@@ -44,7 +44,7 @@ class Steering:
         now_ns, dt_s, pose = inputs.now_ns, inputs.dt_s, inputs.pose
         height_m = self._plausibility.height_m(inputs.height_m)
         motion = self._motion(pose, height_m, dt_s, stand_yaw_rad, lead)
-        control, reference = self._control, guidance.reference
+        control, reference = self._control, guidance.reference.after(lead.after_s)
         sight_s, ease = min(inputs.x_age_s, inputs.y_age_s), self._plausibility.oscillation.ease
         if guidance.guide is Guide.NONE:
             control.reset()

@@ -108,3 +108,11 @@ def test_it_goes_no_faster_with_a_strong_push_than_it_can_stop(start_m: float) -
     """Of 1.7 m/s^2 that it may lean a push of 1.5, of which it knows 1.2, leaves 0.2 to stop it by."""
     assert _blown(1.5, 1.2, start_m) < 0.15
     assert _blown(1.2, 1.2, start_m) < 0.15
+
+
+def test_what_is_wanted_goes_on_as_it_moves() -> None:
+    """The motion is foreseen: held against what is wanted now, the drone would trail it."""
+    wanted = Reference(1.0, 2.0, 0.3, 1.6, vx_mps=0.8, vy_mps=-0.2, ax_mps2=-0.5, ay_mps2=0.1).after(0.2)
+    assert (wanted.x_m, wanted.y_m) == pytest.approx((1.0 + 0.16 - 0.01, 2.0 - 0.04 + 0.002))
+    assert (wanted.vx_mps, wanted.vy_mps) == pytest.approx((0.7, -0.18))
+    assert (wanted.yaw_rad, wanted.height_m) == (0.3, 1.6)

@@ -171,3 +171,13 @@ def test_what_a_setpoint_makes_of_the_attitude_is_foreseen_into_the_lag_of_the_l
     truth = vehicle.samples[-1]
     assert abs(truth.roll_rad - reached.roll_rad) < 0.25 * abs(truth.roll_rad - begun.roll_rad)
     assert abs(truth.pitch_rad - reached.pitch_rad) < 0.25 * abs(truth.pitch_rad - begun.pitch_rad)
+
+
+def test_of_a_vehicle_that_somebody_else_flies_no_answer_is_foreseen() -> None:
+    """To the last setpoint that was in force, perhaps a steep one, it answers no more."""
+    response, now_ns = flown(Vehicle(0.08, told_s=0.1), 4.0)
+    for n in range(50):
+        now_ns += TICK_NS
+        response.sent(now_ns, AttitudeSetpoint(now_ns, 0.15) if n < 10 else None)
+        response.told(Attitude(now_ns, 0.0, 0.0, 0.0), obeys=n < 10)
+    assert all(abs(one.roll_rad) < 1e-6 for one in response.foreseen(now_ns))
