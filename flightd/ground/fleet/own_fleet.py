@@ -199,7 +199,8 @@ class OwnFleet(VehicleSides):
 
     async def _begin_as_before(self, floor: KeptFloor, fleet: KeptFleet) -> None:
         """Nobody leaves the ground for what that station was asked for, unless the site starts without a
-        person; who is in the air flies on to it."""
+        person; who is in the air flies on to it.  Where what is closed is not on their map, that is closed
+        everywhere, as it was before: nobody is left hanging in the air."""
         if {*fleet.drones} != {*self._drones} or {*floor.floors} != {*self._drones}:
             _LOG.warning("the fleet had other drones before: it flies once all told where they stand")
             return
@@ -214,10 +215,8 @@ class OwnFleet(VehicleSides):
         await self._begin(made, drones, pace_of(floor.standings.values()))
 
     async def _made(self, floors: Mapping[str, FloorStatus], stands: Mapping[str, str]) -> FleetFloor:
-        """InputError where they cannot be flown on it, or not all that is closed is there."""
-        floor = await self._aside(partial(FleetFloor, floors, stands, self._cell))
-        self._closures.check(floor.map)
-        return floor
+        """InputError where they cannot be flown on it."""
+        return await self._aside(partial(FleetFloor, floors, stands, self._cell))
 
     def _drones_on(self, floor: FleetFloor) -> dict[str, FleetDrone]:
         return {
@@ -282,6 +281,7 @@ class OwnFleet(VehicleSides):
         stands = {name: standing.node for name, standing in standings.items()}
         try:
             floor = await self._made(floors, stands)
+            self._closures.check(floor.map)
         except InputError as err:
             if self._trouble != str(err):
                 _LOG.warning(

@@ -286,11 +286,13 @@ def test_nobody_is_flown_by_a_map_that_lacks_what_is_closed(tmp_path: Path) -> N
         before = Closure("A", (("A2", "A2b"), ("A2b", "A3")), "aisle A is closed")
         memory.keep_closures((KeptClosure(before, "ann", 0.0),))
         fleet.start_again()
-        await asyncio.sleep(30.0)
-        assert not fleet.state["flies"]
-        assert fleet.state["trouble"].startswith("aisle A is closed, but on another map")
-        await fleet.own.open("A")
         await until(lambda: fleet.state["flies"], 10)
+        fleet.own.ask(["B3"])
+        await asyncio.sleep(30.0)
+        assert fleet.state["not_done"] == {"B3": f"{before.why}, but on another map (fleet.db)"}
+        assert {drone.phase for drone in fleet.drones.values()} == {Phase.PREFLIGHT}
+        await fleet.own.open("A")
+        await until_done(fleet, "B3")
 
     fly(go, memory=memory)
 
@@ -374,6 +376,27 @@ def test_where_what_is_closed_is_not_on_the_map_who_flies_comes_home(monkeypatch
         await until_done(fleet, "B4")
 
     fly(go, "ab")
+
+
+def test_the_next_station_brings_home_who_flies_where_what_is_closed_is_not_on_the_map(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    elsewhere = Closure("X", (("A2", "X1"),), "what is between A2, X1 is closed")
+    monkeypatch.setattr(own_fleet, "closure_between", lambda *_: elsewhere)
+
+    async def go(fleet: PaperFleet) -> None:
+        b = fleet.drones["b"]
+        await on_way_to("B4", fleet)
+        await fleet.own.close("ann", nodes=["A2", "X1"])
+        await fleet.kill()
+        fleet.start_again()
+        await until(lambda: b.phase is Phase.DONE and at_rest(fleet), 200)
+        assert (b.truth.x_m, "home" in b.commands) == (0.0, False)
+        assert fleet.state["not_done"] == {"B4": f"{elsewhere.why}, but on another map (fleet.db)"}
+        await fleet.own.open("X")
+        await until_done(fleet, "B4")
+
+    fly(go, memory=FleetMemory(tmp_path))
 
 
 def test_what_lies_behind_what_is_closed_is_told_and_flown_once_that_is_open() -> None:
