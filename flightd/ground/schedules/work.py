@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
@@ -60,14 +60,16 @@ def work_of(
     return Work(nodes[:MOST_NODES])
 
 
-def valued_work(floor: FloorStatus, worth: Mapping[str, Worth], chosen: Collection[str]) -> Work:
-    """The nodes that were chosen by their `worth`: exceptions first, then what was never counted, then the
-    others, each in the order of the aisles.  InputError where there are none."""
-    nodes = [node.id for node in floor.nodes if node.id in chosen]
+def valued_work(floor: FloorStatus, worth: Mapping[str, Worth], chosen: Sequence[str]) -> Work:
+    """Of the nodes that were chosen by their `worth`, the most valuable first, as many as a run has:
+    exceptions first, then what was never counted, then the others, each in the order of the aisles.
+    InputError where there are none."""
+    first = {*chosen[:MOST_NODES]}
+    nodes = [node.id for node in floor.nodes if node.id in first]
     nodes.sort(key=lambda node: -worth.get(node, UNKNOWN).value)
     if not nodes:
         raise InputError("all nodes wait already, or are closed")
-    return Work(tuple(nodes[:MOST_NODES]))
+    return Work(tuple(nodes))
 
 
 def _aisle_nodes(floor: FloorStatus, aisles: Sequence[str]) -> tuple[str, ...]:

@@ -6,10 +6,14 @@ import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
+from flightd.adapters.ground_link.floor_status import floor_status
+from flightd.adapters.ground_link.messages.floor import FloorNode
 from flightd.core.errors import InputError
 from flightd.core.inventory import CountPose, LocationState, Observation, PlannedLocation, Standing
+from flightd.core.planned_flight import MOST_NODES
 from flightd.core.types import CodeRead, Phase
 from flightd.fleet.traffic.valued_work import PlaceFacts, Worth, worth_of
 from flightd.fleet.traffic.work_queue import Value
@@ -21,10 +25,12 @@ from flightd.ground.ground_store.evidence import FolderEvidence
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.reading_process import ReadingProcess
+from flightd.ground.schedules.work import valued_work
 from flightd.ground.stores import Stores
-from flightd.ground.valued_nodes import ByValue
+from flightd.ground.valued_nodes import ByValue, valued_nodes
 from flightd.inventory.stock_columns import StockColumns
 from tests.rigs.event_loops import real
+from tests.rigs.paper_drones import hall
 from tests.rigs.paper_fleet import PaperFleet, fly, until
 from tests.unit.ground.test_fleet_restart import until_done
 
@@ -138,6 +144,14 @@ def test_an_aisle_that_is_closed_is_none_of_the_most_valuable(tmp_path: Path) ->
         assert set(fleet.own.ask_by_value(WORTH, ByValue(aisles=1))) == {"A1", "A2", "A3", "A4", "A5"}
 
     fly(go, "ab", memory=FleetMemory(tmp_path))
+
+
+def test_of_more_nodes_than_a_run_has_the_oldest_are_counted_in_the_order_of_the_aisles() -> None:
+    nodes = [FloorNode(f"N{i}", float(i), 0.0, "A", (1,)) for i in range(MOST_NODES + 10)]
+    floor = msgspec.structs.replace(floor_status(hall("a")), nodes=nodes)
+    worth = {node.id: Worth(Value.OLD, float(i)) for i, node in enumerate(nodes)}
+    run = valued_work(floor, worth, valued_nodes(floor, worth, ByValue()))
+    assert run.nodes == tuple(node.id for node in nodes[10:])
 
 
 def test_the_next_station_knows_the_value_of_what_waits(tmp_path: Path) -> None:
