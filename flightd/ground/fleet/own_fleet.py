@@ -349,6 +349,10 @@ class OwnFleet(VehicleSides):
         fly."""
         return self._flying().valued(worth, asked)
 
+    def has_run(self, run: str) -> bool:
+        """It was given the work of a run, which may not be written down yet."""
+        return run in self._runs
+
     def knows_run(self, run: str) -> bool:
         """The work of a run is written down as given, with the run's id."""
         return run in self._kept_runs
@@ -357,7 +361,7 @@ class OwnFleet(VehicleSides):
         """Have the nodes of a schedule's run visited, once; `knows_run` says when that is written down.
         InputError for a node that is not there, UnavailableError where the fleet does not fly."""
         traffic = self._asked_traffic()
-        if run not in self._runs:
+        if not self.has_run(run):
             traffic.ask_worth(worth)
             self._runs = (*self._runs, run)[-_MOST_RUNS:]
 

@@ -37,6 +37,10 @@ class ScheduledFleet(Protocol):
         """No person has the drone."""
         ...
 
+    def has_run(self, run: str) -> bool:
+        """It was given the work of a run, which may not be written down yet."""
+        ...
+
     def knows_run(self, run: str) -> bool:
         """The work of a run is written down as given, with the run's id."""
         ...

@@ -272,7 +272,7 @@ class NightShift:
     async def _hand_over(self, schedule: Schedule, run: Run, fleet: ScheduledFleet) -> None:
         """Give the fleet what is due, once: it keeps the run's id beside the work.  Until that is written
         down the run is none that was started."""
-        if not fleet.knows_run(run.plan):
+        if not fleet.has_run(run.plan):
             try:
                 fleet.take_run(run.plan, await self._worth(schedule, run.nodes))
             except FlightdError as err:
@@ -291,7 +291,7 @@ class NightShift:
         fleet = None if drone is None or run.session else self._fleet_of(drone)
         if drone is not None and fleet is not None:
             may = over_s < 0 and not schedule.rule.is_quiet(now) and self._objection(schedule, drone) is None
-            if may or fleet.knows_run(run.plan):
+            if may or fleet.has_run(run.plan):
                 await self._hand_over(schedule, run, fleet)
             elif over_s >= 0:
                 await self._write(replace(run, state=RunState.UNKNOWN, why=_NO_ANSWER))

@@ -16,6 +16,7 @@ from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.adapters.ground_link.messages.answers import Welcome
 from flightd.adapters.ground_link.messages.base import Role
 from flightd.adapters.ground_link.messages.published import StatusReport
+from flightd.core.errors import UnavailableError
 from flightd.core.types import Phase
 from flightd.fleet.traffic.valued_work import PlaceFacts
 from flightd.fleet.traffic.work_queue import Value
@@ -73,6 +74,8 @@ class Station:
         self.book = ScheduleBook(folder)
         self.book.keep("schedule-1", kept, self.utc_ns())
         self.lines: list[str] = []
+        self.knows = True
+        """What is known of the places can be read."""
         self.begin()
 
     def begin(self) -> None:
@@ -85,6 +88,8 @@ class Station:
     async def of(self, site: str) -> tuple[PlaceFacts, ...]:
         """What is known of the places."""
         assert site == "hall"
+        if not self.knows:
+            raise UnavailableError("the ground store is locked")
         return FACTS
 
     def utc_ns(self) -> int:
@@ -156,6 +161,28 @@ def test_a_station_that_is_killed_as_it_gives_it_gives_it_once(tmp_path: Path, w
         await until(lambda: {*fleet.state["done"]} == AISLE, 300)
 
     night(tmp_path, go)
+
+
+def test_what_is_given_and_not_written_down_yet_is_given_once_whatever_is_known_of_it(tmp_path: Path) -> None:
+    async def go(station: Station) -> None:
+        fleet = station.fleet
+        fleet.deciding = asyncio.Event()  # nothing is written down before it is decided
+        run = await station.look()
+        assert run is not None
+        station.knows = False
+        for minute in range(3):
+            await station.look(DUE + timedelta(minutes=minute))
+        assert not fleet.own.knows_run(run.plan)
+        fleet.deciding.set()
+        fleet.deciding = None
+        await until(lambda: fleet.own.knows_run(run.plan), 30)
+        station.knows = True
+        again = await station.look(DUE + timedelta(minutes=5))
+        assert again is not None
+        assert (again.plan, again.state, station.lines) == (run.plan, RunState.STARTED, ["accepted"])
+        assert open_or_given(fleet) | {*fleet.state["done"]} == {*run.nodes}
+
+    night(tmp_path, go, Kept("hall", "Most valuable", "a", CountByValue(nodes=2), "22:00", "UTC"))
 
 
 def test_what_keeps_all_drones_on_the_ground_is_told_and_the_run_is_caught_up(tmp_path: Path) -> None:
