@@ -98,15 +98,24 @@ class WorkQueue:
         return self._given
 
     def ask(self, work: Iterable[NodeWork]) -> None:
-        """More of it, or again; what a drone has already stays with it."""
+        """More of it, or again; what a drone has already stays with it.  Of what waits or is given, the
+        higher value stays, and of equal ones the drone that is named."""
         for each in work:
-            self._work[each.node] = each
+            if not self._outweighs(each):
+                self._work[each.node] = each
             self.reasons.pop(each.node, None)
             self._given_up.discard(each.node)
             if each.node in self.done:
                 self.done.remove(each.node)
             if each.node not in self._given:
                 self._open[each.node] = None
+
+    def _outweighs(self, asked: NodeWork) -> bool:
+        """What is to be done there already says more than what is asked for now."""
+        if asked.node not in self._open and asked.node not in self._given:
+            return False
+        known = self._work[asked.node]
+        return (known.value, known.drone != "") > (asked.value, asked.drone != "")
 
     def finish(self, node: str) -> None:
         """It is counted; nothing, of a node without work."""

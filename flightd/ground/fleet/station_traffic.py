@@ -129,7 +129,7 @@ class StationTraffic:
         self._flown: set[str] = set()
         self._called_back: set[str] = set()
         self._airs: dict[str, Air] = {}
-        self._asked: dict[str, NodeWork] = {}
+        self._asked: list[NodeWork] = []
         self._decides = False
         self._view = TrafficView(self._control, drones)
         self._told: dict[str, Any] = {}
@@ -168,18 +168,18 @@ class StationTraffic:
             its = worth.get(node.id)
             if its is not None:
                 work = NodeWork(node.id, node.aisle, i, (), self._dwell_ms, its.value, its.age_s, drone)
-                self._asked[node.id] = work
+                self._asked.append(work)
         if not self._decides:
             self._take_asked()
 
     def valued(self, worth: Mapping[str, Worth], asked: ByValue) -> tuple[str, ...]:
         """The most valuable nodes (`valued_nodes`) that do not wait yet, and are not closed."""
         closed = {node for one in self._closures.on(self._floor.map) for node in one.nodes}
-        known = {*self._queue.open, *self._queue.given, *self._asked, *closed}
+        known = {*self._queue.open, *self._queue.given, *self.asked, *closed}
         return valued_nodes(self._floor.map, worth, asked, known)
 
     def _take_asked(self) -> None:
-        self._queue.ask(self._asked.values())
+        self._queue.ask(self._asked)
         self._asked.clear()
 
     async def step(self, now_ms: int, aside: Aside) -> None:
@@ -294,4 +294,4 @@ class StationTraffic:
     @property
     def asked(self) -> tuple[str, ...]:
         """What was asked for since the step in hand began."""
-        return tuple(self._asked)
+        return tuple(dict.fromkeys(work.node for work in self._asked))

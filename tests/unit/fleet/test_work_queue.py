@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import pytest
+
 from flightd.fleet.traffic.work_queue import NodeWork, TourTimes, Value, WorkQueue
 
 HOP_MS = 2_000
 
 
-def work(node: str, value: Value = Value.NEVER_COUNTED, age_s: float = 0.0) -> NodeWork:
-    return NodeWork(node, node[0], int(node[1:]), (f"{node}-1", f"{node}-2"), 10_000, value, age_s)
+def work(node: str, value: Value = Value.NEVER_COUNTED, age_s: float = 0.0, drone: str = "") -> NodeWork:
+    return NodeWork(node, node[0], int(node[1:]), (f"{node}-1", f"{node}-2"), 10_000, value, age_s, drone)
 
 
 def times(pad_aisle: str = "A") -> TourTimes:
@@ -80,3 +82,39 @@ def test_what_is_handed_back_waits_again_or_has_its_reason() -> None:
     queue.finish("A2")
     assert queue.done == ["A2"]
     assert set(queue.open) == {"A1", "A3"}
+
+
+@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize(
+    ("before", "then", "stays"),
+    [
+        ((Value.ASKED, "b"), (Value.OLD, ""), (Value.ASKED, "b")),
+        ((Value.ASKED, "b"), (Value.ASKED, ""), (Value.ASKED, "b")),
+        ((Value.ASKED, "b"), (Value.ASKED, "c"), (Value.ASKED, "c")),
+        ((Value.ASKED, ""), (Value.ASKED, "c"), (Value.ASKED, "c")),
+        ((Value.OLD, ""), (Value.CONTRADICTED, ""), (Value.CONTRADICTED, "")),
+    ],
+)
+def test_what_is_asked_for_while_it_waits_stays_with_whom_and_as_valuable_as_it_was(
+    given: bool, before: tuple[Value, str], then: tuple[Value, str], stays: tuple[Value, str]
+) -> None:
+    queue = WorkQueue([work("A1", before[0], drone=before[1])])
+    if given:
+        queue.take("b", ["A1"])
+    queue.ask([work("A1", then[0], drone=then[1])])
+    assert (queue.work("A1").value, queue.work("A1").drone) == stays
+    assert queue.given == ({"A1": "b"} if given else {})
+
+
+def test_what_is_done_or_cannot_be_done_is_asked_for_anew_as_it_is_now() -> None:
+    queue = WorkQueue([work("A1", Value.ASKED, drone="b"), work("A2", Value.ASKED, drone="b")])
+    queue.finish("A1")
+    queue.give_up("A2", "too far")
+    queue.ask([work("A1", Value.OLD), work("A2", Value.OLD)])
+    assert [queue.work(node) for node in queue.open] == [work("A1", Value.OLD), work("A2", Value.OLD)]
+
+
+def test_of_equal_value_the_age_is_the_one_told_last() -> None:
+    queue = WorkQueue([work("A1", Value.OLD, 10.0)])
+    queue.ask([work("A1", Value.OLD, 20.0)])
+    assert queue.work("A1").age_s == 20.0

@@ -154,6 +154,26 @@ def test_of_more_nodes_than_a_run_has_the_oldest_are_counted_in_the_order_of_the
     assert run.nodes == tuple(node.id for node in nodes[10:])
 
 
+def test_a_node_that_a_person_asked_one_drone_for_stays_so_whatever_asks_for_it_then(tmp_path: Path) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        for drone in fleet.drones.values():
+            drone.never_starts = True
+        fleet.deciding = asyncio.Event()
+        await asyncio.sleep(1.0)
+        fleet.own.ask(["B3"], "b")
+        fleet.own.take_run("run-1", {"B3": Worth(Value.OLD, 60.0), "A3": Worth(Value.OLD, 60.0)})
+        assert fleet.state["open"] == ["B3", "A3"]
+        fleet.deciding.set()
+        fleet.deciding = None
+        await until(lambda: fleet.own.knows_run("run-1"))
+        kept = FleetMemory(tmp_path).read()
+        assert kept is not None
+        work = {one.node: (one.value, one.drone) for one in kept[1].work.work}
+        assert work == {"B3": (Value.ASKED, "b"), "A3": (Value.OLD, "")}
+
+    fly(go, "ab", memory=FleetMemory(tmp_path))
+
+
 def test_the_next_station_knows_the_value_of_what_waits(tmp_path: Path) -> None:
     async def go(fleet: PaperFleet) -> None:
         for drone in fleet.drones.values():
