@@ -186,7 +186,8 @@ class NightShift:
         }
         started = [run for run in runs.values() if run.state is RunState.STARTED]
         if started and isinstance(schedule.kept.count, CountMission):
-            await self._note_left(schedule, max(started, key=lambda run: run.day))
+            newest = max(started, key=lambda run: run.day)
+            await self._note_left(schedule, schedule.kept.count.mission, newest)
         unanswered = [run for run in runs.values() if run.state is RunState.ORDERED]
         for run in unanswered:
             await self._resume(schedule, run, now)
@@ -341,19 +342,26 @@ class NightShift:
             flown = (count.mission, plan, nodes, self._clock.utc_ns())
             await self._threads.run(self._missions.handed_over, *flown)
 
-    async def _note_left(self, schedule: Schedule, run: Run) -> None:
+    async def _note_left(self, schedule: Schedule, mission: str, run: Run) -> None:
         """Of a mission that the fleet has: its drones fly by other plans, and tell nothing of this one.  What
         is asked for anew once nothing was left is none of it."""
         drone = self._drones.get(run.drone)
         fleet = None if drone is None or run.session else self._fleet_of(drone)
-        known = self._left.get(schedule.id)
-        is_over = known == (run.plan, ())
-        if fleet is None or is_over or not fleet.knows_run(run.plan):
+        if fleet is None or not fleet.knows_run(run.plan):
             return
-        left = run.plan, fleet.left_of(run.nodes)
+        known = self._left.get(schedule.id) or await self._left_before(mission)
+        left = known if known == (run.plan, ()) else (run.plan, fleet.left_of(run.nodes))
         if left != known:
             await self._threads.run(self._missions.left, *left)
-            self._left[schedule.id] = left
+        self._left[schedule.id] = left
+
+    async def _left_before(self, mission: str) -> tuple[str, tuple[str, ...]]:
+        """As the station before wrote it down; of a mission that is kept no more, nothing."""
+        try:
+            kept = await self._threads.run(self._missions.mission, mission)
+        except InputError:
+            return "", ()
+        return kept.plan, kept.remaining
 
     async def _refused(self, schedule: Schedule, run: Run, state: RunState, why: str) -> None:
         """The drone does not take it: that may change, unless another flightd answered than may have started

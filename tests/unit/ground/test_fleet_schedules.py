@@ -280,6 +280,10 @@ def test_a_kept_mission_knows_when_the_fleet_had_it_and_what_is_left(tmp_path: P
         fleet.own.ask(["B3"])
         await station.look(DUE + timedelta(hours=1))
         assert missions.mission("mission-1").remaining == (), "what is asked for anew is none of the run's"
+        station.begin()
+        await station.look(DUE + timedelta(hours=1))
+        assert "B3" in open_or_given(fleet)
+        assert missions.mission("mission-1").remaining == (), "another station knows that, too"
 
     night(tmp_path, go, Kept("hall", "Two", "a", CountMission("mission-1"), "22:00", "UTC"))
 
