@@ -100,6 +100,8 @@ class FleetMemory:
         )
         self._utc_s = utc_s
         self._newest: object = None
+        self._floor: KeptFloor | None = None
+        """By which it began, where that is not written down yet."""
 
     def begin(
         self,
@@ -110,11 +112,9 @@ class FleetMemory:
         runs: tuple[str, ...] = (),
     ) -> None:
         """The fleet flies by these maps from now on, and is so as it begins; nothing else of before is left
-        but what people closed."""
-        self._newest = None
-        with self._database.changed() as kept:
-            _put(kept, "floor", replace(floor, version=__version__))
-            _put(kept, "fleet", KeptFleet(drones, work, self._utc_s(), runs))
+        but what people closed.  Where the disk refuses, the maps go with what is kept next."""
+        self._newest, self._floor = None, replace(floor, version=__version__)
+        self._put_fleet(KeptFleet(drones, work, self._utc_s(), runs))
 
     def keep(
         self, drones: Mapping[str, KeptDrone], work: KeptWork, *, waits: bool, runs: tuple[str, ...] = ()
@@ -125,9 +125,15 @@ class FleetMemory:
         of_note = {name: _of_note(drone) for name, drone in drones.items()}
         newest = of_note, work, waits and utc_s // _TELLS_S, runs
         if newest != self._newest:
-            with self._database.changed() as kept:
-                _put(kept, "fleet", KeptFleet(drones, work, utc_s, runs))
+            self._put_fleet(KeptFleet(drones, work, utc_s, runs))
             self._newest = newest
+
+    def _put_fleet(self, fleet: KeptFleet) -> None:
+        with self._database.changed() as kept:
+            if self._floor is not None:
+                _put(kept, "floor", self._floor)
+            _put(kept, "fleet", fleet)
+        self._floor = None
 
     def keep_closures(self, closed: tuple[KeptClosure, ...]) -> None:
         """These, and no others, are closed."""

@@ -10,9 +10,11 @@ from typing import Any
 
 import pytest
 
+from flightd.core.errors import UnavailableError
 from flightd.core.types import CommandKind, Phase
 from flightd.ground.fleet.fleet_memory import FILE, TOO_OLD, FleetMemory
 from flightd.ground.messages import Act
+from flightd.ground.own_database import OwnDatabase
 from tests.rigs.paper_drones import hall
 from tests.rigs.paper_fleet import PaperFleet, fly, on_way_to, until
 
@@ -237,6 +239,40 @@ def test_a_station_that_dies_as_it_begins_by_another_map_leaves_the_work(
             drone.never_starts = False
         fleet.own.ask(["B3"])
         await until_done(fleet, "A3 B3")
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
+def test_a_map_that_cannot_be_written_down_as_the_fleet_begins_by_it_is_with_what_is_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def locked(database: OwnDatabase) -> None:
+        refused.append(database.file)
+        patched.undo()
+        raise UnavailableError("database is locked")
+
+    refused: list[Path] = []
+    patched = pytest.MonkeyPatch()
+
+    async def go(fleet: PaperFleet) -> None:
+        await asyncio.sleep(5.0)
+        with monkeypatch.context() as begins:
+            begin = FleetMemory.begin
+
+            def refuses(*of: Any, **more: Any) -> None:
+                patched.setattr(OwnDatabase, "changed", locked)
+                begin(*of, **more)
+
+            begins.setattr(FleetMemory, "begin", refuses)
+            for name, drone in fleet.drones.items():
+                drone.site = hall(name, "hall 2")
+                drone.begin_anew()
+            await until(lambda: bool(refused) and fleet.state["flies"] and fleet.own.site == "hall 2", 60)
+        await asyncio.sleep(5.0)
+        await fleet.kill()
+        fleet.start()  # nobody has told anything anew
+        await until(lambda: fleet.state["flies"])
+        assert (fleet.own.site, len(refused)) == ("hall 2", 1)
 
     fly(go, memory=FleetMemory(tmp_path))
 
