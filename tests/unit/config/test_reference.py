@@ -37,7 +37,7 @@ def test_a_row_tells_type_unit_range_and_default_as_the_file_has_them() -> None:
     assert row("mission.autostart")[2:6] == ("true or false", "", "", "false")
     assert row("mission.expert.turn_accel_degps2")[2:6] == ("number", "deg/s^2", "above 0 to 720", "57.2958")
     assert row("scan.max_height_m")[2:6] == ("number", "m", "0.5 to 20", "")
-    assert row("control.horizontal.kp")[2:6] == ("number", "m/s^2 per m", "0 to 100", "6.5")
+    assert row("control.horizontal.kp")[2:6] == ("number", "m/s^2 per m", "0 to 100", "10")
     assert row("tracking.expert.noise.gust_s")[2:6] == ("number", "s", "above 0 to 60", "2.5")
 
 
