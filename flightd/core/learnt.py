@@ -12,8 +12,8 @@ class Learnt(enum.IntEnum):
 
     ROLL, PITCH: the told attitude is too small by this, rad; LEAK: rate at which it leaks, 1/s; MOUNT_ROLL,
     MOUNT_PITCH, MOUNT_YAW: the camera in the airframe, rad; DELAY: frames are exposed so much later than
-    their stamps say, s; SCALE: share by which the camera's focal length is shorter, so
-    that lengths on a floor that is looked down on are longer."""
+    their stamps say, s; SCALE: share by which the camera's focal length is shorter, so that lengths on a
+    floor that is looked down on are longer."""
 
     ROLL = 0
     PITCH = 1

@@ -81,7 +81,7 @@ class Unknowns:
         lens, mount = configured.lens, configured.mount
         return replace(
             configured,
-            lens=replace(lens, fx_px=lens.fx_px * self.focal_share, fy_px=lens.fy_px * self.focal_share),
+            lens=lens.longer_by(self.focal_share),
             mount=replace(
                 mount,
                 yaw_rad=mount.yaw_rad + self.mount_yaw_rad,

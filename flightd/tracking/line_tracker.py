@@ -196,7 +196,7 @@ class LineTracker:
         if attitude is None or not self._headed or lines.stamp_ns <= self._told_ns:
             self.rejected += 1
             return False
-        view = replace(self._view(attitude, stamp_ns, height_m), lens=self._lens)
+        view = self._view(attitude, stamp_ns, height_m, self._lens)
         by_width_m = heights_by_width(lines.lines, view, self._line_width_m)
         height_m = self._widths.believed_m(by_width_m, height_m) * (1.0 + self._filter.mean(HEIGHT))
         if not height_m > 0:
@@ -206,7 +206,7 @@ class LineTracker:
         self._stands = self._stands and height_m < _HARDLY_RISEN_M
         self._filter.height_known_to(height_sigma_m / height_m)
         self._advance(stamp_ns)
-        view = self._view(attitude, stamp_ns, height_m)
+        view = self._view(attitude, stamp_ns, height_m, self._corrected_lens())
         lines = self._as_of_one_moment(lines, attitude, stamp_ns, height_m)
         params, assumed = self._params, self._history.is_assumed(stamp_ns)
         low, high = (share * self._line_width_m for share in params.width_share)
@@ -415,13 +415,13 @@ class LineTracker:
         told = self._attitude_at(stamp_ns)
         return self._filter.accel(Told(told.roll_rad, told.pitch_rad, told.yaw_rad))
 
-    def _view(self, attitude: Attitude, stamp_ns: int, height_m: float) -> FloorView:
-        """How the floor was seen from that height, by what has been learnt of attitude and mount."""
+    def _view(self, attitude: Attitude, stamp_ns: int, height_m: float, lens: Lens) -> FloorView:
+        """How the floor was seen from that height through that lens, by what has been learnt of attitude and
+        mount."""
         sigma_tilt_rad = 0.0 if self._compensation is TiltCompensation.EXACT else self._params.sigma_tilt_rad
         if self._history.is_assumed(stamp_ns):
             sigma_tilt_rad = _ASSUMED_TILT_RAD
         mount, corrected = self._corrected_mount(), self._corrected(attitude)
-        lens = self._corrected_lens()
         return FloorView(lens, mount, corrected, height_m, self._compensation, sigma_tilt_rad)
 
     def _corrected_lens(self) -> Lens:

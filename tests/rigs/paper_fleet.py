@@ -88,6 +88,16 @@ class PaperFleet:
             await self.deciding.wait()
         return found
 
+    def hold_once_begun(self, patched: pytest.MonkeyPatch) -> None:
+        """Nothing more is decided once the fleet has begun by the next map: `deciding` is there by then."""
+        begin = FleetMemory.begin
+
+        def begins(*of: Any, **more: Any) -> None:
+            begin(*of, **more)
+            self.deciding = asyncio.Event()
+
+        patched.setattr(FleetMemory, "begin", begins)
+
     def tell(self, drone: str, topic: str, value: Any) -> None:
         """As the hub tells its pages."""
         self.pages[drone, topic] = value

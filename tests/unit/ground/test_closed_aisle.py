@@ -35,6 +35,8 @@ SEEDS = int(os.environ.get("FLIGHTD_WALKS", "4"))
 _TO_NEXT_NODE_S = 4.0
 _CROSSINGS_M = (2.0, 5.2)
 """Aisle A lies between these, at y = 0."""
+ELSEWHERE = Closure("X", (("A2", "X1"),), "what is between A2, X1 is closed")
+"""Of which the map has one end only."""
 
 
 def entered(fleet: PaperFleet) -> set[str]:
@@ -320,19 +322,13 @@ def test_a_map_that_lacks_what_is_closed_is_flown_by_once_that_is_open(
 def test_what_is_closed_on_the_old_map_as_the_next_one_begins_grounds_all_and_loses_no_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    begin = FleetMemory.begin
-
     async def go(fleet: PaperFleet) -> None:
         for drone in fleet.drones.values():
             drone.never_starts = True
         fleet.own.ask(["B3"])
         await asyncio.sleep(5.0)
 
-        def begins(*of: Any, **more: Any) -> None:
-            begin(*of, **more)
-            fleet.deciding = asyncio.Event()
-
-        monkeypatch.setattr(FleetMemory, "begin", begins)
+        fleet.hold_once_begun(monkeypatch)
         monkeypatch.setattr(paper_drones, "_STEPS_M", (2.0, 1.6, 1.6))
         monkeypatch.setattr(paper_drones, "PADS", {"a": "A1", "b": "B1"})
         for name, drone in fleet.drones.items():
@@ -360,8 +356,7 @@ def test_what_is_closed_on_the_old_map_as_the_next_one_begins_grounds_all_and_lo
 
 
 def test_where_what_is_closed_is_not_on_the_map_who_flies_comes_home(monkeypatch: pytest.MonkeyPatch) -> None:
-    elsewhere = Closure("X", (("A2", "X1"),), "what is between A2, X1 is closed")
-    monkeypatch.setattr(own_fleet, "closure_between", lambda *_: elsewhere)
+    monkeypatch.setattr(own_fleet, "closure_between", lambda *_: ELSEWHERE)
 
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
@@ -370,7 +365,7 @@ def test_where_what_is_closed_is_not_on_the_map_who_flies_comes_home(monkeypatch
         await until(lambda: "b" in (closure(fleet)["inside"] or ()), 5)
         await until(lambda: b.phase is Phase.DONE and at_rest(fleet), 200)
         assert (b.truth.x_m, "home" in b.commands) == (0.0, False)
-        assert fleet.state["not_done"] == {"B4": f"{elsewhere.why}, but on another map (fleet.db)"}
+        assert fleet.state["not_done"] == {"B4": f"{ELSEWHERE.why}, but on another map (fleet.db)"}
         await until(lambda: closure(fleet)["inside"] == (), 5)
         await fleet.own.open("X")
         await until_done(fleet, "B4")
@@ -381,8 +376,7 @@ def test_where_what_is_closed_is_not_on_the_map_who_flies_comes_home(monkeypatch
 def test_the_next_station_brings_home_who_flies_where_what_is_closed_is_not_on_the_map(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    elsewhere = Closure("X", (("A2", "X1"),), "what is between A2, X1 is closed")
-    monkeypatch.setattr(own_fleet, "closure_between", lambda *_: elsewhere)
+    monkeypatch.setattr(own_fleet, "closure_between", lambda *_: ELSEWHERE)
 
     async def go(fleet: PaperFleet) -> None:
         b = fleet.drones["b"]
@@ -392,7 +386,7 @@ def test_the_next_station_brings_home_who_flies_where_what_is_closed_is_not_on_t
         fleet.start_again()
         await until(lambda: b.phase is Phase.DONE and at_rest(fleet), 200)
         assert (b.truth.x_m, "home" in b.commands) == (0.0, False)
-        assert fleet.state["not_done"] == {"B4": f"{elsewhere.why}, but on another map (fleet.db)"}
+        assert fleet.state["not_done"] == {"B4": f"{ELSEWHERE.why}, but on another map (fleet.db)"}
         await fleet.own.open("X")
         await until_done(fleet, "B4")
 

@@ -212,20 +212,13 @@ def test_nobody_leaves_the_ground_for_what_a_station_before_was_asked_for(tmp_pa
 def test_a_station_that_dies_as_it_begins_by_another_map_leaves_the_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begin = FleetMemory.begin
-
     async def go(fleet: PaperFleet) -> None:
         for drone in fleet.drones.values():
             drone.never_starts = True
         fleet.own.ask(["A3"])
         await asyncio.sleep(5.0)
-
-        def begins(*of: Any, **more: Any) -> None:
-            begin(*of, **more)
-            fleet.deciding = asyncio.Event()  # nothing comes after it
-
         with monkeypatch.context() as patched:
-            patched.setattr(FleetMemory, "begin", begins)
+            fleet.hold_once_begun(patched)
             for name, drone in fleet.drones.items():
                 drone.site = hall(name, "hall 2")
                 drone.begin_anew()
