@@ -22,6 +22,11 @@ _GROWN, _GROWN_MPS = 1.4, 0.5
 _EASED = 0.6
 LEAST_EASE = 0.35
 """The slowest at which a drone is still held against the air."""
+_WILD_MPS = 0.8
+"""Swings as fast leave no time for small steps."""
+_LEVEL_EASE = 0.12
+"""Hardly more than level, for what swings on so wildly: the airframe itself rings, and every counter-lean
+feeds it."""
 _SETTLES_NS = 1_000_000_000
 """So long a loop that was slowed down has to come to rest before it is slowed down again."""
 _RESTS_NS = 800_000_000
@@ -64,6 +69,11 @@ class _Axis:
         peak_mps = abs(self._peak_mps)
         grows = counts and self._swings > 0 and peak_mps > max(_GROWN * self._before_mps, _GROWN_MPS)
         return grows or self._swings + counts >= _HALF_SWINGS
+
+    @property
+    def peak_mps(self) -> float:
+        """The fastest of the half swing in hand and the one before it."""
+        return max(abs(self._peak_mps), self._before_mps)
 
     def _turn(self, now_ns: int, since_ns: int) -> None:
         if (now_ns - since_ns) * 1e-9 >= _SHORTEST_S:
@@ -117,7 +127,11 @@ class OscillationMonitor:
             self.ease, self._calm_since_ns, self._tried = min(self.ease / _EASED, self._most), now_ns, True
 
     def _slow_down(self, now_ns: int) -> None:
-        self.ease = max(self.ease * _EASED, LEAST_EASE)
+        peak_mps = max(axis.peak_mps for axis in self._axes)
+        if peak_mps > _WILD_MPS:
+            self.ease = _LEVEL_EASE if self.ease <= LEAST_EASE else LEAST_EASE
+        else:
+            self.ease = min(max(self.ease * _EASED, LEAST_EASE), self.ease)
         if self._tried:  # it was not the first seconds of a flight that knew little
             self._most = self.ease
         self._axes = _Axis(), _Axis()

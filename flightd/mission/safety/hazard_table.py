@@ -353,7 +353,8 @@ HAZARDS: tuple[Hazard, ...] = (
         "half swings of the velocity about the reference's above 0.3 m/s: three, none smaller than four"
         " fifths of the one before, or two that grow: the position loop is too fast for what is late in it",
         Action.HOLD,
-        "slowed down to 60 %, then to 36 %, tried faster again once after 8 s of calm; brake, hold; on when"
+        "slowed down to 60 %, then to 35 %, at once where it swings faster than 0.8 m/s, and hardly more than"
+        " level where even that does; tried faster again once after 8 s of calm; brake, hold; on when"
         " it is over; land after 12 s of it alone: gusts and a shaken camera keep even a slow loop moving",
         _FAST,
     ),

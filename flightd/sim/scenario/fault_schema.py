@@ -106,10 +106,12 @@ class LinkFault(_Fault):
 
 
 class AttitudeSlow(_Fault):
-    """The airframe answers more slowly: the bandwidth of its attitude is this share of what it was."""
+    """The airframe answers more slowly: the bandwidth of its attitude is this share of what it was; and
+    it rings, where a ratio of damping is given."""
 
     kind: Literal["attitude_slow"]
     share: float = Field(0.3, gt=0, le=1)
+    damping: float | None = Field(None, gt=0, le=2)
 
 
 class AttitudeBiased(_Fault):

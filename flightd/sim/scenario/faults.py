@@ -16,7 +16,7 @@ from flightd.core.topics import Topic
 from flightd.ports import Clock, Recorder
 from flightd.sim.autopilot.autopilot import AutopilotPeer
 from flightd.sim.floor.floor import Box
-from flightd.sim.plant.airframe import Airframe
+from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import Wind, WindParams
 from flightd.sim.scenario.fault_schema import (
@@ -185,9 +185,7 @@ class WorldFaults:
                 wind = WindParams(fault.mean_x_mps, fault.mean_y_mps, fault.gust_mps)
                 self._airframe.wind = Wind(wind, 7) if on else self._calm
             case AttitudeSlow():
-                whole_radps = self._whole.attitude_bandwidth_radps
-                bandwidth_radps = whole_radps * fault.share if on else whole_radps
-                self._airframe.params = replace(self._whole, attitude_bandwidth_radps=bandwidth_radps)
+                self._airframe.params = _slowed(self._whole, fault) if on else self._whole
             case _ if isinstance(self._vehicle, AutopilotPeer):
                 _break(self._vehicle, fault, on)
 
@@ -210,6 +208,14 @@ class WorldFaults:
             case CameraFault():
                 level = 0 if fault.kind == "camera_black" else 255
                 trouble.level = level if on else None
+
+
+def _slowed(whole: AirframeParams, fault: AttitudeSlow) -> AirframeParams:
+    return replace(
+        whole,
+        attitude_bandwidth_radps=whole.attitude_bandwidth_radps * fault.share,
+        attitude_damping=whole.attitude_damping if fault.damping is None else fault.damping,
+    )
 
 
 def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:

@@ -34,9 +34,18 @@ class Hovered:
     late_mps: float
 
 
-def hover(share: float, gust_mps: float, seed: int, *, eases: bool = True, seconds: float = 40.0) -> Hovered:
-    """Over one place, by setpoints that act 40 ms late; `share` is the bandwidth's in a sound airframe's."""
-    params = AirframeParams(attitude_bandwidth_radps=share * SOUND.attitude_bandwidth_radps)
+def slowed(share: float, damping: float | None) -> AirframeParams:
+    """`share` is the bandwidth's in a sound airframe's."""
+    return AirframeParams(
+        attitude_bandwidth_radps=share * SOUND.attitude_bandwidth_radps,
+        attitude_damping=SOUND.attitude_damping if damping is None else damping,
+    )
+
+
+def hover(
+    params: AirframeParams, gust_mps: float, seed: int, *, eases: bool = True, seconds: float = 40.0
+) -> Hovered:
+    """Over one place, by setpoints that act 40 ms late."""
     body = Airframe(params, WindParams(gust_rms_mps=gust_mps, vertical_gust_rms_mps=0.0), seed)
     body.height_m, body.on_floor, body.collective = HEIGHT_M, False, SOUND.hover_collective
     control, monitor = FlightController(ControlConfig()), OscillationMonitor()
@@ -64,12 +73,21 @@ def hover(share: float, gust_mps: float, seed: int, *, eases: bool = True, secon
 def test_the_airframe_of_the_scenario_swings_is_found_in_time_and_slowed_down(seed: int) -> None:
     assert isinstance(SLOW, AttitudeSlow)
     assert EXPECTED is not None
-    hovered = hover(SLOW.share, 0.3, seed)
+    swinging = slowed(SLOW.share, SLOW.damping)
+    hovered = hover(swinging, 0.3, seed)
     assert hovered.found_s < EXPECTED.found_s
-    assert hovered.late_mps < 0.5 * hover(SLOW.share, 0.3, seed, eases=False).late_mps
+    assert hovered.late_mps < 0.5 * hover(swinging, 0.3, seed, eases=False).late_mps
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("share", "damping"), [(0.3, 0.15), (0.5, 0.1)])
+def test_one_that_rings_by_itself_is_held_hardly_more_than_level_and_comes_to_rest(
+    share: float, damping: float, seed: int
+) -> None:
+    assert hover(slowed(share, damping), 0.3, seed).late_mps < 0.5
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("gust_mps", [0.3, 0.8])
 def test_a_sound_airframe_in_gusts_never_swings(gust_mps: float, seed: int) -> None:
-    assert hover(1.0, gust_mps, seed, seconds=60.0).found_s == math.inf
+    assert hover(SOUND, gust_mps, seed, seconds=60.0).found_s == math.inf
