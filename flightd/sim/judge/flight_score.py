@@ -24,6 +24,8 @@ from flightd.sim.judge.motion import OFF_FLOOR_M, TrueMotion, Values
 
 _AT_NODE_M = 0.5
 """A node counts as visited rightly when the drone was within this of it (less than half a cell)."""
+_ASIDE_M = 0.4
+"""So much farther where no other node is as near: from there a shelf is looked at again (`scan.aside_m`)."""
 _LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
 """An event of this phase is a warning where the landing is not the plan's."""
 _CONTROL_GAP_S = 0.5
@@ -144,7 +146,9 @@ def _at_node(flight: FlightEvidence, event: Event) -> bool:
     node, there = flight.site.nodes.get(event.text), flight.truth_at(event.stamp_ns)
     if node is None or there is None:
         return False
-    return math.hypot(there.x_m - node.x_m, there.y_m - node.y_m) < _AT_NODE_M
+    off_m = math.hypot(there.x_m - node.x_m, there.y_m - node.y_m)
+    nearest_m = min(math.hypot(there.x_m - n.x_m, there.y_m - n.y_m) for n in flight.site.nodes.values())
+    return off_m < (_AT_NODE_M if off_m > nearest_m else _AT_NODE_M + _ASIDE_M)
 
 
 def _flight_time_s(motion: TrueMotion) -> float:

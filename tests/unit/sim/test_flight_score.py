@@ -207,8 +207,14 @@ def test_counts_that_are_wrong_are_bad_and_a_flight_without_fault_is_good() -> N
     wrong = judged(good, score(good), codes_wrong=2, empty_wrong=1)
     assert [(fault.kind, fault.value) for fault in wrong] == [("codes_wrong", 2.0), ("empty_wrong", 1.0)]
     assert kinds(replace(good, lost=3)) == {"record_lost": 3.0}
-    elsewhere = replace(good, truth=landed(at(S, 0.0), at(4 * S, 2.7), at(7 * S, 0.0)))
-    assert kinds(elsewhere)["miscounted"] == 1.0
+
+
+@pytest.mark.parametrize(("x_m", "miscounted"), [(0.95, 0.0), (2.1, 0.0), (2.3, 1.0), (2.7, 1.0)])
+def test_a_node_is_visited_rightly_from_aside_while_no_other_is_nearer(x_m: float, miscounted: float) -> None:
+    visited = Event(4 * S, EventLevel.INFO, "visited", "A2")
+    statuses = [status(0, node="A1", goal="A2"), DONE]
+    flown = evidence(landed(at(S, 0.0), at(4 * S, x_m), at(7 * S, 0.0)), statuses, [visited])
+    assert kinds(flown).get("miscounted", 0.0) == miscounted
 
 
 def test_each_kind_of_fault_says_what_it_is() -> None:
