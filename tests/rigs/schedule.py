@@ -25,6 +25,7 @@ _TOGETHER = {
     "tests/sim/ground/test_ground_lost.py",
     "tests/sim/ideal/test_height_changes.py",
     "tests/sim/ideal/test_ideal_sweep.py",
+    "tests/sim/pictures/test_face_light.py",
     "tests/sim/pictures/test_shelf_reading.py",
     "tests/unit/cli/test_vision_commands.py",
     "tests/unit/log_study/test_log_study.py",
