@@ -312,6 +312,7 @@ class Scanner:
         if self._sweep is not None:
             if leg is not None:
                 self._shot = self._light.shot(_faces(leg), self._leg_light(leg), flown_mps)
+                self._sweep.fly(now_ns, leg)
             if not self._light.follows:
                 self._fix_exposure(now_ns)
             self._sweep.step(now_ns)

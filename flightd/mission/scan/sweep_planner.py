@@ -19,6 +19,8 @@ from flightd.site.ways import NoWayError
 
 _WHOLE_SHARE = 0.9
 """Levels are flown past together only where each place of them is so far in the picture."""
+_APART_M = 0.05
+"""Lanes that are nearer to each other in height show the same: all is flown past at once."""
 _LEADS_OUT = 2
 """So many nodes beyond what is counted a way is flown on to leave the aisle: farther may be for nothing."""
 _LEAST_NODES = 2
@@ -220,7 +222,7 @@ class SweepPlanner:
             singles = [[self._site.locations[code]] for code in view.locations]
             views += [view] if whole else [v for one in singles for v in self._views.column(at.id, one)]
         lanes = []
-        for view in views:
+        for view in _merged(views):
             levels = tuple(self._site.locations[code].level for code in view.locations)
             on = tuple(place for place in places if place.level in levels)
             distance_m = abs(on[0].y_m - at.y_m)
@@ -258,6 +260,19 @@ class SweepPlanner:
         one, other = site.nodes[nodes[low]], site.nodes[nodes[high]]
         h = lane.height_m
         return straight and site.is_clear((one.x_m, one.y_m, h), (other.x_m, other.y_m, h))
+
+
+def _merged(views: Sequence[View]) -> list[View]:
+    """Those of one column, from the lowest up, that are looked at from one height taken as one: limits of the
+    height may leave different levels the same."""
+    merged: list[View] = []
+    for view in views:
+        below = merged[-1] if merged else None
+        if below is not None and abs(view.height_m - below.height_m) < _APART_M:
+            merged[-1] = replace(below, locations=below.locations + view.locations)
+        else:
+            merged.append(view)
+    return merged
 
 
 def _ordered(lanes: Sequence[Lane], yaw_rad: float, height_m: float) -> list[Lane]:

@@ -25,9 +25,10 @@ from flightd.mission.scan.scanner import Scanner
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.site.site import Site
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
+from tests.unit.mission import shelves
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
-from tests.unit.mission.shelves import BARE_ENDS, FITTED, SIGHT, SITE
+from tests.unit.mission.shelves import BARE_ENDS, FITTED, SIGHT, SITE, one_aisle
 from tools.sweep_time import spent
 
 PLACES = tuple(SITE.locations)
@@ -200,6 +201,42 @@ def test_aisle_after_aisle_is_flown_past_with_one_half_turn_each_and_no_way_out_
     assert not flight.scanned
     assert [node[0] for node, _ in flight.turned] == ["A", "B", "C"], "from one side to the other"
     assert len(flight.legs) == 12
+
+
+@pytest.mark.parametrize(
+    ("levels_m", "flown"),
+    [
+        pytest.param((0.5, 0.75, 1.7), [(1, 2), (1, 2), (3,), (3,)], id="at one height"),
+        pytest.param((0.5, 0.95), [(1,), (1,), (2,), (2,)], id="nearer than it strays"),
+    ],
+)
+def test_levels_that_the_lowest_height_brings_together_are_counted_on_their_own_legs(
+    levels_m: tuple[float, ...], flown: list[tuple[int, ...]]
+) -> None:
+    """It flies a decimetre above each leg."""
+    site = one_aisle(levels_m)
+    flight = Sweep(site=site, stock=Stock({code: [Label(f"PALLET {code}", 0.1)] for code in site.locations}))
+    flight.fly()
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert sorted(leg.levels for leg in flight.legs) == flown
+    assert flight.states == dict.fromkeys(site.locations, LocationState.READ)
+    assert len(flight.findings) == len(site.locations), "nothing is counted twice"
+    assert not flight.scanned, flight.said("swept")
+
+
+def test_a_picture_that_is_read_late_counts_for_the_leg_on_which_it_was_taken() -> None:
+    scanner = scanner_of(config(), one_aisle((0.5, 0.95)))
+    legs = scanner.legs(("A1", "A2", "A3", "A4"), "A1", -math.pi / 2, 0.8)
+    scanner.begin_sweep(legs)
+    scanner.begin_leg(0)
+    for k, leg in enumerate(legs[:2]):
+        scanner.step_sweep(k * 10 * PICTURE_NS, leg, 0.8)
+    between_m = (legs[0].height_m + legs[1].height_m) / 2
+    for k in (9, 11):
+        here = shelves.pose(k * PICTURE_NS, height_m=between_m)
+        seen = {place.location for place in scanner.places(here)}
+        assert seen
+        assert seen <= set(legs[k // 10].locations)
 
 
 def test_between_two_legs_it_waits_for_nothing_but_height_and_heading() -> None:

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightd.config.front_camera import FrontCameraConfig
-from flightd.config.scan import ScanConfig
 from flightd.config.schema import Config
 from flightd.mission.plan.itinerary import in_best_order
 from flightd.mission.plan.leg_times import Pace
@@ -22,7 +21,7 @@ from flightd.mission.scan.views import ViewPlanner
 from flightd.site.site import Side, Site
 from flightd.site.site_file import parse_site
 from tests.unit.mission.configured import configured
-from tests.unit.mission.shelves import BARE_ENDS, SIGHT, SITE
+from tests.unit.mission.shelves import BARE_ENDS, SIGHT, SITE, one_aisle
 
 NODES = ("A1", "A2", "A3", "A4")
 ALL = frozenset(SITE.locations)
@@ -32,7 +31,7 @@ CONFIG = configured()
 def sweeps(site: Site = SITE, sight: FrontSight = SIGHT, config: Config = CONFIG) -> SweepPlanner:
     assigner = Assigner(site, sight)
     return SweepPlanner(
-        site, ViewPlanner(site, sight, assigner, ScanConfig()), assigner, SweepOptics.of(config)
+        site, ViewPlanner(site, sight, assigner, config.scan), assigner, SweepOptics.of(config)
     )
 
 
@@ -134,6 +133,24 @@ def test_levels_whose_places_fit_one_picture_are_flown_past_together() -> None:
     tall = sweeps(sight=FrontSight(front.lens(), front.mount()))
     assert {lane.levels for lane in tall.lanes("A", ALL)} == {(1, 2)}
     assert {lane.levels for lane in PLANNER.lanes("A", ALL)} == {(1,), (2,)}
+
+
+@settings(max_examples=40)
+@given(
+    st.lists(st.floats(0.1, 3.0), min_size=1, max_size=5),
+    st.floats(0.5, 1.5),
+    st.none() | st.floats(1.5, 3.0),
+)
+def test_whatever_the_limits_of_the_height_each_place_is_on_one_lane_and_no_two_show_the_same(
+    heights_m: list[float], least_m: float, most_m: float | None
+) -> None:
+    levels_m = sorted({round(height_m, 1) for height_m in heights_m})
+    site = one_aisle(levels_m)
+    scan = {"min_height_m": least_m, "max_height_m": most_m}
+    lanes = sweeps(site, config=configured().with_values(scan=scan)).lanes("A", site.locations)
+    assert sorted(place.code for lane in lanes for place in lane.places) == sorted(site.locations)
+    for one, other in pairwise(lanes):
+        assert one.side is not other.side or other.height_m - one.height_m >= 0.05
 
 
 def test_a_one_way_aisle_is_counted_by_stopping() -> None:
