@@ -38,8 +38,9 @@ class PlannedSweep:
     Flown at `height_m`, `distance_m` from the shelf, at `speed_mps`, which `limit` keeps from being more;
     `limits_mps` is what each limit alone allows.  `exposure` is a part of the front camera's usual one,
     `views` how many whole views each place gets of the `fps` frames read in a second, `needed_fps` how many
-    that speed needs.  Not `swept`: its labels are too small in the picture, it is counted by stopping.
-    `text` says so in a line."""
+    that speed needs.  Not `swept`: it is counted by stopping, and `stops_for` is why: `labels` too small in
+    the picture, a place's `width` more than that, a `line` that is not open and clear both ways, too few
+    `nodes`.  `text` says so in a line."""
 
     aisles: tuple[str, ...]
     levels: tuple[int, ...]
@@ -56,6 +57,7 @@ class PlannedSweep:
     fps: float
     needed_fps: float
     swept: bool
+    stops_for: str
     text: str
 
 

@@ -12,7 +12,7 @@ from flightd.core.errors import InputError
 from flightd.core.planned_flight import MOST_NODES, PlannedFlight
 from flightd.mission.battery.outings import Supply, WaysOfPlan, flown_on
 from flightd.mission.battery.sorties import Sorties
-from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan, runs_of
 from flightd.mission.plan.leg_times import Legs, Pace
 from flightd.mission.plan.route_optimiser import ordered_best
 from flightd.mission.scan.no_scan import AnyScanner
@@ -100,7 +100,7 @@ class ChosenPlans:
             batteries=flown.batteries,
             charge=charge,
             battery_s=(1.0 - self._battery.reserve) / rate_per_s,
-            sweeps=() if by_stopping else self._scanner.told_sweeps(dict.fromkeys(nodes), levels),
+            sweeps=() if by_stopping else self._scanner.told_sweeps(runs_of(site, plan.stops), levels),
         )
 
     def _sorties(self, levels: Sequence[int], *, by_stopping: bool) -> Sorties:

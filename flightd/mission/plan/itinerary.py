@@ -11,7 +11,7 @@ from flightd.config.mission import Heading
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import EventLevel, GridPose
 from flightd.mission.event_log import EventLog
-from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop, make_plan
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop, make_plan, run_of
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.reasons import Reason, in_words
 from flightd.site.site import Site
@@ -87,11 +87,7 @@ class Itinerary:
     @property
     def run(self) -> tuple[str, ...]:
         """The goal and the visits that follow it in its aisle without another stop between."""
-        aisle = self._site.nodes[self.goal.node].aisle
-        following = itertools.takewhile(
-            lambda stop: stop.visit and self._site.nodes[stop.node].aisle == aisle, self._stops[self._next :]
-        )
-        return tuple(stop.node for stop in following)
+        return run_of(self._site, self._stops[self._next :])
 
     @property
     def _run_left(self) -> tuple[str, ...]:

@@ -69,7 +69,9 @@ class NoScan:
     def leave(self) -> None:
         """Nothing is left."""
 
-    def told_sweeps(self, _nodes: Iterable[str], _levels: Sequence[int] = ()) -> tuple[PlannedSweep, ...]:
+    def told_sweeps(
+        self, _runs: Iterable[Sequence[str]], _levels: Sequence[int] = ()
+    ) -> tuple[PlannedSweep, ...]:
         return ()
 
     def legs(

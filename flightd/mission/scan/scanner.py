@@ -26,10 +26,11 @@ from flightd.mission.scan.label_checks import LabelChecks
 from flightd.mission.scan.node_scan import ScanTask
 from flightd.mission.scan.passing_time import PassingTime
 from flightd.mission.scan.pending_findings import PendingFindings
-from flightd.mission.scan.sweep_planner import SweepPlanner, told
+from flightd.mission.scan.sweep_planner import JudgedLane, SweepPlanner
 from flightd.mission.scan.sweep_speed import SweepOptics
 from flightd.mission.scan.sweep_task import SweepTask
 from flightd.mission.scan.sweep_votes import Undecided
+from flightd.mission.scan.told_sweeps import told
 from flightd.mission.scan.views import View, ViewPlanner, views_s
 from flightd.site.site import Site
 
@@ -263,13 +264,20 @@ class Scanner:
         """Whether shelves are counted in passing first."""
         return self._sweeps is not None
 
-    def told_sweeps(self, nodes: Iterable[str], levels: Sequence[int] = ()) -> tuple[PlannedSweep, ...]:
-        """How what hangs at some nodes, on all levels or these, is flown past; empty where it never is."""
+    def told_sweeps(
+        self, runs: Iterable[Sequence[str]], levels: Sequence[int] = ()
+    ) -> tuple[PlannedSweep, ...]:
+        """How what hangs at the nodes of `runs`, each in one aisle and begun at its first node, is flown past
+        on all levels or these, and why where it is not; empty where nothing ever is."""
         if self._sweeps is None:
             return ()
-        codes = [code for node in nodes for code in self.places_at(node, levels)]
-        aisles = dict.fromkeys(self._aisle_of[self._node_of[code]] for code in codes)
-        return told(lane for aisle in aisles for lane in self._sweeps.lanes(aisle, codes))
+        lanes: list[JudgedLane] = []
+        before: frozenset[str] = frozenset()
+        for run in runs:
+            codes = frozenset(code for node in run for code in self.places_at(node, levels)) - before
+            lanes += self._sweeps.judged(run, codes, run[0], 0.0, 0.0)
+            before |= codes
+        return told(lanes)
 
     def legs(self, run: Sequence[str], here: str, yaw_rad: float, height_m: float) -> tuple[SweepLeg, ...]:
         """The legs past what is left to count at the nodes `run` of an aisle, for a drone over its node

@@ -28,12 +28,17 @@ class Limit(enum.StrEnum):
     CONFIGURED = "configured"
 
 
-LIMIT_WORDS = {
-    Limit.BLUR: "the blur of a module at the shortest exposure that the light allows",
-    Limit.OVERLAP: "the frame rate: each place must be wholly in several pictures",
-    Limit.CRUISE: "mission.speed_mps",
-    Limit.CONFIGURED: "scan.sweep.speed_mps",
-}
+class StopCause(enum.StrEnum):
+    """Why places are counted by stopping, none of them in passing."""
+
+    LABELS = "labels"
+    """Their labels are too small in the picture."""
+    WIDTH = "width"
+    """A place is wider than the picture."""
+    LINE = "line"
+    """The line is not open both ways, or not clear at that height."""
+    NODES = "nodes"
+    """They are before too few nodes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +85,8 @@ class SweepSpeed:
     `exposure` is a part of the camera's usual one, `window_m` the way on which a place is wholly in the
     picture, `views` how many pictures that gives, `fps` how many frames a second are read and `needed_fps`
     how many this speed needs; `limits_mps` what each limit alone allows, `limit` the lowest of them.
-    `readable`: the labels are large enough in the picture, and a place fits it."""
+    0 m/s where a place is wider than the picture.  `stops_for` is why it is not flown past, None if it may
+    be: the labels are large enough in the picture, and a place fits it."""
 
     speed_mps: float
     limit: Limit
@@ -92,7 +98,7 @@ class SweepSpeed:
     views: float
     fps: float
     needed_fps: float
-    readable: bool
+    stops_for: StopCause | None
 
 
 def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
@@ -113,6 +119,9 @@ def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
     # no darker than the speed asks for
     exposure = min(1.0, view.speed_limit_mps() / speed_mps) if speed_mps > 0.0 else 1.0
     px = view.px_per_module(shelf.distance_m)
+    stops_for = None if window_m > 0.0 else StopCause.WIDTH
+    if px < MIN_PX_PER_MODULE * (1.0 - _SLACK):
+        stops_for = StopCause.LABELS
     return SweepSpeed(
         speed_mps=speed_mps,
         limit=limit,
@@ -123,6 +132,6 @@ def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
         window_m=max(window_m, 0.0),
         views=window_m * optics.fps / speed_mps if speed_mps > 0.0 else 0.0,
         fps=optics.fps,
-        needed_fps=optics.views * speed_mps / window_m if window_m > 0.0 else math.inf,
-        readable=px >= MIN_PX_PER_MODULE * (1.0 - _SLACK) and window_m > 0.0,
+        needed_fps=optics.views * speed_mps / window_m if window_m > 0.0 else 0.0,
+        stops_for=stops_for,
     )

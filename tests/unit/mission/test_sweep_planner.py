@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 
 import pytest
@@ -15,8 +16,9 @@ from flightd.config.schema import Config
 from flightd.mission.plan.itinerary import in_best_order
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
-from flightd.mission.scan.sweep_planner import SweepPlanner, told
+from flightd.mission.scan.sweep_planner import SweepPlanner
 from flightd.mission.scan.sweep_speed import SweepOptics
+from flightd.mission.scan.told_sweeps import told
 from flightd.mission.scan.views import ViewPlanner
 from flightd.site.site import Side, Site
 from flightd.site.site_file import parse_site
@@ -153,8 +155,7 @@ def test_whatever_the_limits_of_the_height_each_place_is_on_one_lane_and_no_two_
         assert one.side is not other.side or other.height_m - one.height_m >= 0.05
 
 
-def test_a_one_way_aisle_is_counted_by_stopping() -> None:
-    text = """
+ONE_WAY = """
 [site]
 name = "one way"
 ceiling_m = 6.0
@@ -181,7 +182,11 @@ id = "home"
 node = "A1"
 size_m = 0.5
 """
-    site = parse_site(text, "one way")
+"""The first of two aisles is flown one way."""
+
+
+def test_a_one_way_aisle_is_counted_by_stopping() -> None:
+    site = parse_site(ONE_WAY, "one way")
     planner = sweeps(site)
     everything = frozenset(site.locations)
     assert not planner.legs(("A1", "A2", "A3"), everything, "A1", 0.0, 1.0)
@@ -189,13 +194,48 @@ size_m = 0.5
 
 
 def test_the_plan_says_once_what_is_alike_and_what_limits_it() -> None:
-    first, second = told(PLANNER.lanes("A", ALL))
+    first, second = told(PLANNER.judged(NODES, ALL, "A1", 0.0, 0.0))
     assert (first.levels, second.levels, first.places + second.places) == ((1,), (2,), len(ALL))
     assert first.limit == "cruise"
     assert "mission.speed_mps" in first.text
-    small = told(sweeps(config=configured().with_values(scan={"sweep": {"module_m": 0.001}})).lanes("A", ALL))
-    assert not small[0].swept
-    assert "by stopping" in small[0].text
+
+
+@pytest.mark.parametrize(
+    ("site", "run", "sweep", "why", "words"),
+    [
+        (SITE, NODES, {"module_m": 0.001}, "labels", "its labels have 0.83 pixels"),
+        (one_aisle(bay_m=2.6, positions=1), NODES, {}, "width", "its places are wider than the picture"),
+        (SITE, ("A2",), {}, "nodes", "before one node only"),
+        (parse_site(ONE_WAY, "one way"), ("A1", "A2", "A3"), {}, "line", "not open and clear both ways"),
+    ],
+)
+def test_the_plan_says_of_what_is_not_flown_past_why(
+    site: Site, run: tuple[str, ...], sweep: dict[str, float], why: str, words: str
+) -> None:
+    planner = sweeps(site, config=configured().with_values(scan={"sweep": sweep}))
+    codes = frozenset(site.locations)
+    assert not planner.legs(run, codes, run[0], 0.0, 0.0)
+    sweeps_told = told(planner.judged(run, codes, run[0], 0.0, 0.0))
+    assert not any(each.swept for each in sweeps_told)
+    assert json.dumps([asdict(each) for each in sweeps_told], allow_nan=False)
+    texts = [each.text for each in sweeps_told if each.stops_for == why]
+    assert texts
+    assert all("by stopping; " in text and words in text for text in texts)
+
+
+@settings(max_examples=40)
+@given(
+    st.sets(st.sampled_from(sorted(ALL)), min_size=1),
+    st.lists(st.sampled_from(NODES), min_size=1, max_size=4, unique=True),
+)
+def test_what_is_told_as_flown_past_is_what_is_flown_past(wanted: set[str], run: list[str]) -> None:
+    judged = PLANNER.judged(run, frozenset(wanted), run[0], 0.0, 0.0)
+    legs = PLANNER.legs(run, frozenset(wanted), run[0], 0.0, 0.0)
+    flown = {(one.lane.side, one.lane.levels) for one in judged if one.stops_for is None}
+    assert flown == {(leg.side, leg.levels) for leg in legs}
+    assert sum(len(one.lane.places) for one in judged) == len(
+        [code for code in wanted if SITE.locations[code].node in run]
+    )
 
 
 @settings(max_examples=40)

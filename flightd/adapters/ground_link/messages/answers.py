@@ -56,8 +56,14 @@ class PlannedPass(msgspec.Struct, frozen=True):
     views: Annotated[float, Meta(description="pictures that show each place whole")]
     fps: Annotated[float, Meta(description="frames that are read, 1/s")]
     needed_fps: Annotated[float, Meta(description="frames that this speed needs, 1/s")]
-    swept: Annotated[bool, Meta(description="false: counted by stopping, its labels are too small")]
+    swept: Annotated[bool, Meta(description="false: counted by stopping")]
     text: Annotated[str, Meta(description="all that in a line")]
+    stops_for: Annotated[
+        str,
+        Meta(
+            description="why by stopping: labels, width (of a place), line, nodes (too few); empty: it is not"
+        ),
+    ] = ""
 
 
 class Planned(DaemonAnswer, frozen=True, tag="planned"):
