@@ -10,15 +10,17 @@ if TYPE_CHECKING:
 
 
 def planned_in_words(plan: PlannedFlight | Planned) -> list[str]:
-    """The nodes, the flight's figures, and how shelves are counted in passing."""
+    """The nodes, the flight's figures, what labels are too small, and how shelves are counted in
+    passing."""
     batteries = "1 battery" if plan.batteries == 1 else f"{plan.batteries} batteries"
     nodes = "1 node" if len(plan.nodes) == 1 else f"{len(plan.nodes)} nodes"
-    counted = f", {plan.places} places counted" if plan.places else ""
+    lost = f", the labels of {plan.unread.places} too small" if plan.unread else ""
+    counted = f", {plan.places} places counted{lost}" if plan.places else ""
     figures = (
-        f"{nodes}, {plan.way_m:.0f} m{counted}, about {plan.seconds / 60:.1f} min in the air,"
-        f" {batteries}"
+        f"{nodes}, {plan.way_m:.0f} m{counted}, about {plan.seconds / 60:.1f} min in the air, {batteries}"
     )
-    return [" ".join(plan.nodes), figures, *(_sweep_in_words(each) for each in plan.sweeps)]
+    unread = [] if plan.unread is None else [f"{plan.unread.what}; {plan.unread.remedy}"]
+    return [" ".join(plan.nodes), figures, *unread, *(_sweep_in_words(each) for each in plan.sweeps)]
 
 
 def _sweep_in_words(sweep: PlannedSweep | PlannedPass) -> str:

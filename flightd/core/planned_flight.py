@@ -17,7 +17,7 @@ class PlannedFlight:
     turns, from pad to pad, `way_m` how long that is.
     `seconds` in the air need `batteries`, full ones but for the first, of which `charge` is left; a battery
     is taken to last `battery_s` in the air down to its reserve.  `sweeps` is what is flown past, empty where
-    shelves are counted by stopping."""
+    shelves are counted by stopping; `unread` is what of `places` has labels too small to read."""
 
     nodes: tuple[str, ...]
     levels: tuple[int, ...]
@@ -29,6 +29,21 @@ class PlannedFlight:
     charge: float
     battery_s: float
     sweeps: tuple[PlannedSweep, ...] = ()
+    unread: UnreadLabels | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class UnreadLabels:
+    """The labels of so many `places` are not surely read, or not at all, from as near as a stop looks from.
+
+    Their modules are `px_per_module` wide in the picture from the aisle's line, at the worst place; they are
+    read `within_m`.  `what` and `remedy` say so."""
+
+    places: int
+    px_per_module: float
+    within_m: float
+    what: str
+    remedy: str
 
 
 @dataclass(frozen=True, slots=True)

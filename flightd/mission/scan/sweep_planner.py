@@ -13,6 +13,7 @@ from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.code_assignment import Assigner
 from flightd.mission.scan.sweep_speed import Shelf, StopCause, SweepOptics, SweepSpeed, sweep_speed
 from flightd.mission.scan.views import View, ViewPlanner, up_and_down
+from flightd.site.coverage import Legibility
 from flightd.site.site import Location, Side, Site
 from flightd.site.ways import NoWayError
 
@@ -29,7 +30,7 @@ _LEAST_NODES = 2
 @dataclass(frozen=True, slots=True)
 class Lane:
     """The levels of one side of an aisle that are flown past at once, from their height: `places` on them by
-    the node that faces each."""
+    the node that faces each.  `legibility` is that of their labels where the drone stops before them."""
 
     aisle: str
     side: Side
@@ -39,6 +40,7 @@ class Lane:
     distance_m: float
     speed: SweepSpeed
     places: tuple[Location, ...]
+    legibility: Legibility
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,11 +221,12 @@ class SweepPlanner:
             on = tuple(place for place in places if place.level in levels)
             distance_m = abs(on[0].y_m - at.y_m)
             cells = (self._assigner.cells[place.code] for place in on)
+            legibility = self._optics.view.legibility(self._views.nearest_m(distance_m))
             shelf = Shelf(distance_m, max(cell.x1_m - cell.x0_m for cell in cells))
             lanes.append(
                 Lane(
                     at.aisle, on[0].side, levels, view.height_m, view.yaw_rad, distance_m,
-                    sweep_speed(shelf, self._optics), on,
+                    sweep_speed(shelf, self._optics), on, legibility,
                 )
             )  # fmt: skip
         return lanes

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from flightd.core.planned_flight import PlannedSweep
+from flightd.mission.scan.legibility import LEGIBILITY_WORDS
 from flightd.mission.scan.sweep_planner import JudgedLane, Lane
 from flightd.mission.scan.sweep_speed import Limit, StopCause
+from flightd.site.coverage import MIN_PX_PER_MODULE, Legibility, too_small
 
 _LIMIT_WORDS = {
     Limit.BLUR: "the blur",
@@ -67,7 +69,10 @@ def _passing(lane: Lane) -> str:
 def _why(lane: Lane, stops_for: StopCause) -> str:
     match stops_for:
         case StopCause.LABELS:
-            return f"its labels have {lane.speed.px_per_module:.2f} pixels for each module"
+            px = lane.speed.px_per_module
+            small = too_small(px, px * lane.distance_m / MIN_PX_PER_MODULE)
+            lost = lane.legibility is not Legibility.SURE
+            return f"{LEGIBILITY_WORDS[lane.legibility]}; {small}" if lost else small
         case StopCause.WIDTH:
             return "its places are wider than the picture"
         case StopCause.LINE:

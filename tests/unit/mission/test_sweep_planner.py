@@ -203,7 +203,13 @@ def test_the_plan_says_once_what_is_alike_and_what_limits_it() -> None:
 @pytest.mark.parametrize(
     ("site", "run", "sweep", "why", "words"),
     [
-        (SITE, NODES, {"module_m": 0.001}, "labels", "its labels have 0.83 pixels"),
+        (
+            SITE,
+            NODES,
+            {"module_m": 0.001},
+            "labels",
+            "labels are not surely read; labels get 0.83 px per module, 2.5 are needed",
+        ),
         (one_aisle(bay_m=2.6, positions=1), NODES, {}, "width", "its places are wider than the picture"),
         (SITE, ("A2",), {}, "nodes", "before one node only"),
         (parse_site(ONE_WAY, "one way"), ("A1", "A2", "A3"), {}, "line", "not open and clear both ways"),
