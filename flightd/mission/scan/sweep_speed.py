@@ -80,7 +80,7 @@ class SweepOptics:
 class SweepSpeed:
     """The fastest flight past a shelf, and what comes of it.
 
-    `exposure` is a part of the camera's usual one.   `window_m` is the way on
+    `exposure` is a part of the camera's usual one, `exposure_s` what that comes to.  `window_m` is the way on
     which a place is wholly in the picture, `views` how many pictures that gives, `fps` how many frames are
     read in a second and `needed_fps` how many this speed needs; `limits_mps` what each limit alone allows,
     `limit` the lowest of them.  0 m/s where a place is wider than the picture.  `stops_for` is why it is not
@@ -96,6 +96,7 @@ class SweepSpeed:
     views: float
     fps: float
     needed_fps: float
+    exposure_s: float
     stops_for: StopCause | None
 
 
@@ -131,5 +132,6 @@ def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
         views=window_m * optics.fps / speed_mps if speed_mps > 0.0 else 0.0,
         fps=optics.fps,
         needed_fps=optics.views * speed_mps / window_m if window_m > 0.0 else 0.0,
+        exposure_s=exposure * view.exposure_s,
         stops_for=stops_for,
     )

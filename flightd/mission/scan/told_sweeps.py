@@ -61,8 +61,9 @@ def _passing(lane: Lane) -> str:
     speed = lane.speed
     return (
         f"{speed.speed_mps:.2f} m/s at {lane.height_m:.2f} m, {lane.distance_m:.2f} m from the shelf,"
-        f" {speed.views:.1f} whole views of each place at {speed.fps:g} frames a second; no faster because of"
-        f" {_LIMIT_WORDS[speed.limit]}"
+        f" {speed.views:.1f} whole views at {speed.fps:g} frames a second,"
+        f" {speed.px_per_module:.2f} px per module, a blur of {speed.blur_modules:.2f} in"
+        f" {speed.exposure_s * 1e3:.2g} ms; no faster because of {_LIMIT_WORDS[speed.limit]}"
     )
 
 

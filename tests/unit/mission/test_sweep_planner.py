@@ -198,6 +198,7 @@ def test_the_plan_says_once_what_is_alike_and_what_limits_it() -> None:
     assert (first.levels, second.levels, first.places + second.places) == ((1,), (2,), len(ALL))
     assert first.limit == "cruise"
     assert "mission.speed_mps" in first.text
+    assert "2.50 px per module, a blur of 0.53 in 2 ms" in first.text
 
 
 @pytest.mark.parametrize(

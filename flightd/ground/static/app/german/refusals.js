@@ -316,7 +316,7 @@ export default {
   "a code that was found at another place, too": "ein Code, der auch auf einem anderen Platz gefunden wurde",
   "the position was doubted": "die Position war bezweifelt",
   "one code at {one} and {other}: both are looked at again": "ein Code bei {one} und {other}: Beide werden noch einmal angesehen",
-  "{speed} m/s at {height} m, {distance} m from the shelf, {views} whole views of each place at {fps} frames a second; no faster because of {limit}": "{speed} m/s auf {height} m, {distance} m vom Regal, jeder Platz {views} Mal ganz im Bild bei {fps} Bildern in der Sekunde; nicht schneller wegen: {limit}",
+  "{speed} m/s at {height} m, {distance} m from the shelf, {views} whole views at {fps} frames a second, {px} px per module, a blur of {blur} in {ms} ms; no faster because of {limit}": "{speed} m/s auf {height} m, {distance} m vom Regal, {views} Mal ganz im Bild bei {fps} Bildern in der Sekunde, {px} px je Modul, Unschärfe {blur} in {ms} ms; nicht schneller wegen: {limit}",
   "by stopping": "im Stehen",
   "labels cannot be read": "Etiketten sind nicht zu lesen",
   "labels are not surely read": "Etiketten werden nicht sicher gelesen",
