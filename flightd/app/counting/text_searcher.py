@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import importlib.util
 import os
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -13,7 +12,6 @@ from typing import Any, Protocol, Self
 
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.errors import TransientError, UnavailableError
-from flightd.core.extras import missing_extra
 from flightd.core.label_values import LabelValue
 from flightd.runtime.child_process import Child
 from flightd.runtime.clock import Hold
@@ -30,13 +28,6 @@ class TextStore(Protocol):
     """Where values of printed text are kept."""
 
     def keep_texts(self, observation: str, texts: Sequence[LabelValue], asked: str) -> None: ...
-
-
-def needs_extra() -> UnavailableError | None:
-    """Why printed text is not read on this machine, if it is not."""
-    if importlib.util.find_spec("rapidocr") and importlib.util.find_spec("onnxruntime"):
-        return None
-    return missing_extra("ocr", "[[scan.text]]: printed text is not read, it")
 
 
 class TextSearcher:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from flightd.config.vehicle import VehicleConfig
 from flightd.doctor.calibration import check_calibration
 from flightd.doctor.camera import Pictures, check_latency, check_vision, judge_camera
 from flightd.doctor.check import Check, CheckLevel
+from flightd.doctor.label_text import check_text
 from flightd.doctor.labels import check_labels
 from flightd.doctor.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
 from flightd.doctor.vehicle import judge as judge_vehicle
@@ -249,3 +251,15 @@ def test_labels_that_are_too_small_to_be_read_are_told_before_the_flight_and_in_
         assert "or take a longer lens or larger labels" in words[2]
         assert all(says.split(": ")[1] in each.text for each in planned.sweeps)
     assert not check_labels(config(), site), "it counts nothing"
+
+
+def test_printed_text_that_nothing_is_there_to_read_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = {"text": [{"kind": "lot", "pattern": "LOT (.*)"}]}
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert check_text(config()) == []
+    checks = check_text(config().with_values(scan=text))
+    assert levels(checks) == [CheckLevel.WARNING]
+    assert "[[scan.text]]: printed text is not read" in checks[0].text
+    assert "-m pip install" in checks[0].remedy
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
+    assert check_text(config().with_values(scan=text)) == []

@@ -21,6 +21,7 @@ from flightd.core.inventory import LocationState
 from flightd.core.label_values import LabelValue, ValueKind, ValueSource
 from flightd.core.scanning import Finding
 from flightd.runtime.clock import LoopClock
+from flightd.vision.shelf import text_reader
 from tests.rigs.event_loops import real
 from tests.rigs.waiting import until
 
@@ -80,9 +81,9 @@ def test_what_is_counted_is_searched_and_kept_with_its_look(tmp_path: Path) -> N
 def test_without_the_extra_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     words = r"\[\[scan\.text\]\]: printed text is not read, it needs what is not installed \(extra ocr\)"
-    assert re.match(words, str(text_searcher.needs_extra()))
+    assert re.match(words, str(text_reader.needs_extra()))
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
-    assert text_searcher.needs_extra() is None
+    assert text_reader.needs_extra() is None
 
 
 def test_what_is_not_searched_is_counted_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
