@@ -2,7 +2,7 @@
 
 K. Okumura, M. Machida, X. Défago and Y. Tamura, "Priority Inheritance with Backtracking for Iterative
 Multi-agent Path Finding", Artificial Intelligence 310, 2022.  Of two moves of a step whose cells meet one is
-made after the other, and one that is in nobody's way only if others did not move is not made at all.
+made after the other, and one whose way is not free even then is left out.
 """
 
 from __future__ import annotations

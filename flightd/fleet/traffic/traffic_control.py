@@ -211,13 +211,15 @@ class TrafficControl:
 
     def replan(self, drones: Iterable[str], now_ms: int) -> tuple[str, ...]:
         """Plan what is not released of these drones anew, all together.  Those for which there is no way,
-        even without stops, hold where their base ends, and are returned."""
+        even without stops, hold where their base ends or go on making room, and are returned."""
         return self._replan(set(drones), self.projected(now_ms), now_ms)
 
     def _replan(
         self, todo: set[str], projected: Mapping[str, Sequence[Action]], now_ms: int
     ) -> tuple[str, ...]:
         todo = {drone for drone in todo if not self.drones[drone].failed}
+        aside = self._making_room(todo, projected, now_ms)
+        todo -= aside
         holding: set[str] = set()
         at_large: set[str] = set()
         may_push = True
@@ -245,12 +247,27 @@ class TrafficControl:
             if not stuck and may_push:
                 may_push = False
                 if self._push_home(projected, now_ms):
-                    return tuple(sorted(holding))
+                    return tuple(sorted(holding | aside))
             holding |= stuck or set(planned.without)
             todo |= holding | self._met_by(holding, projected)
         plans = {**planned.plans, **{drone: Plan(()) for drone in holding}}
         self._adopt(projected, plans)
-        return tuple(sorted(holding))
+        return tuple(sorted(holding | aside))
+
+    def _making_room(
+        self, drones: Collection[str], projected: Mapping[str, Sequence[Action]], now_ms: int
+    ) -> frozenset[str]:
+        """Those of them that are cut off and were pushed out of others' way: planned anew they would stop
+        in it."""
+        pushed = [drone for drone in drones if self.drones[drone].is_pushed_aside]
+        return cut_off(
+            self.net,
+            [
+                each
+                for each in self._to_push(pushed, projected, now_ms)
+                if each.shut.isdisjoint(action.resource for action in self.drones[each.drone].tail)
+            ],
+        )
 
     def _push_home(self, projected: Mapping[str, Sequence[Action]], now_ms: int) -> bool:
         """Everybody goes home by pushing, whatever he had ahead; False, and nothing has changed, where no way

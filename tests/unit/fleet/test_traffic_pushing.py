@@ -21,7 +21,7 @@ from flightd.fleet.traffic.prioritised import FixedBookings, PrioritisedPlanner
 from flightd.fleet.traffic.pushing import Pushed, cut_off, plan_by_pushing
 from flightd.fleet.traffic.tours import Request
 from flightd.fleet.traffic.traffic_control import TrafficControl
-from tests.unit.fleet.traffic_rig import CELL, PACE, SmallHall, fly_out, shared_cells
+from tests.unit.fleet.traffic_rig import CELL, PACE, SmallHall, fly_at_pace, fly_out, shared_cells
 
 SPACING_M = 4.0
 HALL = functools.cache(SmallHall)
@@ -254,16 +254,19 @@ def test_where_people_closed_ways_all_come_home(closed: Closed) -> None:
     assert tuple(places.values()) == closed.hall.lanes.pads
 
 
-def test_who_is_cut_off_from_his_pad_makes_room_for_others_and_is_told() -> None:
-    ways = ("DAB1", "DAB2"), ("DAB5", "DAB6"), ("A6", "DAB7"), ("DAA6", "DAA7")
-    closed = Closed((2, 4), ("DAB4", "B2", "DAA2", "DAB3"), ways)
-    control = closed.control()
-    assert closed.close(control) == ("d1",)
+@pytest.mark.parametrize("every_ms", [5_000, 10_000, 15_000])
+def test_who_is_cut_off_makes_room_for_others_and_goes_on_with_it_when_planned_anew(every_ms: int) -> None:
+    ways = ("DAA2", "A1"), ("DAA1", "DAA2"), ("B4", "B5"), ("DAB3", "DAB4")
+    closed = Closed((2, 4), ("A1", "B2", "B4", "DAA8"), ways)
     assert not closed.planned_alone()
-    pads = closed.hall.lanes.pads
-    places = fly_out(control)
-    assert [places[drone] for drone in ("d0", "d2", "d3")] == [pads[0], pads[2], pads[3]]
-    assert places["d1"] != closed.hall.lanes.over("B2")
+    control = closed.control()
+    assert closed.close(control) == ("d0",)
+    places = fly_at_pace(control, ["d0"], every_ms)
+    assert tuple(places.values())[1:] == closed.hall.lanes.pads[1:]
+    assert places["d0"] != closed.hall.lanes.over("A1")
+    control.open("some")
+    assert control.replan(["d0"], 0) == ()
+    assert fly_out(control)["d0"] == closed.hall.lanes.pads[0]
 
 
 def pushed(puzzle: Puzzle, *, shut: frozenset[int] = frozenset()) -> list[Pushed]:

@@ -87,15 +87,29 @@ def check_air(control: TrafficControl) -> None:
 
 
 def fly_out(control: TrafficControl, seed: int = 0) -> dict[str, int]:
-    """Where all are when nobody has anything ahead that it may do: released at any time, done in any order,
-    and nobody meets."""
+    """Where all are when nobody has anything ahead that it may do: done in any order, and nobody meets."""
     rng = random.Random(seed)
     for now_ms in itertools.count(step=1000):
         control.release(now_ms)
         check_air(control)
         ready = [drone for drone, course in control.drones.items() if course.base]
         if not ready:
-            return {drone: course.place for drone, course in control.drones.items()}
+            break
         drone = rng.choice(ready)
         control.done(drone, control.drones[drone].done + 1, now_ms)
-    raise AssertionError("unreachable")
+    return {drone: course.place for drone, course in control.drones.items()}
+
+
+def fly_at_pace(control: TrafficControl, anew: Sequence[str], every_ms: int) -> dict[str, int]:
+    """The same at the pace that is planned, some being planned `anew` again and again."""
+    for now_ms in range(0, 2_000_000, 1000):
+        if now_ms % every_ms == 0:
+            control.replan(anew, now_ms)
+        control.release(now_ms)
+        check_air(control)
+        for drone, course in control.drones.items():
+            if course.base and now_ms >= course.since_ms + course.base[0].duration_ms:
+                control.done(drone, course.done + 1, now_ms)
+        if not any(course.ahead for course in control.drones.values()):
+            return {drone: course.place for drone, course in control.drones.items()}
+    raise AssertionError("they never come to rest")
