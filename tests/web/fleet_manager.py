@@ -40,14 +40,9 @@ class Manager:
     @contextlib.asynccontextmanager
     async def watching(self, broker: Mosquitto) -> AsyncIterator[None]:
         """It listens meanwhile."""
-        async with asyncio.timeout(20):
-            while True:
-                with contextlib.suppress(aiomqtt.MqttError):
-                    client = aiomqtt.Client("127.0.0.1", broker.port)
-                    await client.__aenter__()
-                    break
-                await asyncio.sleep(0.02)
-        self._client = client
+        await broker.listens()
+        self._client = client = aiomqtt.Client("127.0.0.1", broker.port)
+        await client.__aenter__()
         await client.subscribe(f"{self.top}/#")
         listening = asyncio.create_task(self._listen(client))
         try:
