@@ -1,4 +1,4 @@
-"""The manager of a fleet at a real broker, for a drone called demo."""
+"""The manager of a fleet at a real broker, for one drone."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from tests.unit.fleet.vehicle_rig import validator
 class Manager:
     """A fleet's manager: everything that the broker has of one drone, each message held to its schema."""
 
-    def __init__(self, version: Version) -> None:
+    def __init__(self, version: Version, drone: str = "demo") -> None:
         self._version = version
-        self.top = f"{'uagv' if version is Version.V2_1 else 'vda5050'}/{version.topic}/flightd/demo"
+        self.top = f"{'uagv' if version is Version.V2_1 else 'vda5050'}/{version.topic}/flightd/{drone}"
         self.heard: list[tuple[str, dict[str, Any], bool]] = []
         self._client: aiomqtt.Client | None = None
 

@@ -4,23 +4,16 @@ broker: what it reads, it reads by its own models and its own copies of the sche
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import TYPE_CHECKING
-from unittest import mock
 
-from flightd.adapters.ground_link.client import Address
 from flightd.fleet.vda5050.codec import Version
-from flightd.ground.mqtt.broker_address import read_broker
-from flightd.ground.mqtt.fleet_link import FleetLink
-from flightd.ground.mqtt.managed_drone import OrderRules
 from tests.rigs.broker import Mosquitto, mosquitto
 from tests.rigs.event_loops import real
 from tests.rigs.extras import of_extra
 from tests.rigs.waiting import until
 from tests.web.fleet_manager import and_a_turn
-from tests.web.paper_station import BODY, HeldDrone, PaperStation
-from tests.web.served import served
+from tests.web.paper_station import BODY, managed_drone
 
 if TYPE_CHECKING:
     from vda5050 import MasterClient, OrderBuilder
@@ -83,25 +76,13 @@ class ForeignManager:
         )
 
 
-@contextlib.asynccontextmanager
-async def flown_by(broker: Mosquitto) -> AsyncIterator[HeldDrone]:
-    """A station whose drone on paper takes orders from the broker meanwhile."""
-    station = PaperStation()
-    fleet = FleetLink(["a"], read_broker(broker.url), Version.V2_1, BODY, OrderRules(60.0, lambda *_: None))
-    with mock.patch("flightd.ground.hub.DroneLink", station.link):
-        async with served(("a", Address("127.0.0.1", 1, 2)), fleet=fleet):
-            drone = station.links["a"].drone
-            drone.held = False
-            yield drone
-
-
 def test_a_manager_of_others_flies_a_drone_and_reads_all_that_it_tells(tmp_path: Path) -> None:
     async def go(broker: Mosquitto) -> None:
         await broker.listens()
         async with contextlib.AsyncExitStack() as stack, contextlib.AsyncExitStack() as ground:
             manager = ForeignManager(broker)
             master = await stack.enter_async_context(manager.client)
-            drone = await ground.enter_async_context(flown_by(broker))
+            drone = await ground.enter_async_context(managed_drone(broker, Version.V2_1))
             await until(lambda: manager.is_at("A1") and master.capabilities(DRONE).factsheet)
             assert manager.connections == ["ONLINE"]
             assert manager.states[-1].operating_mode.value == "AUTOMATIC"
