@@ -19,6 +19,7 @@ from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.replay.log import read_log
 from tests.command import Command
 from tests.replay.synthetic_flight import write_flight
+from tests.rigs.extras import of_extra
 from tests.unit.log_study.dying_work import always_dies, dies_once
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -121,7 +122,7 @@ def test_a_worker_that_dies_costs_time_alone(flights: Path, alone: str, tmp_path
 def test_ray_finds_the_same_byte_for_byte_though_a_worker_is_killed(
     flights: Path, alone: str, tmp_path: Path
 ) -> None:
-    pytest.importorskip("ray", reason="the tests of --engine ray need it: pip install -e '.[ray]'")
+    of_extra("ray", "ray")
     shutil.copytree(flights, tmp_path / "flights")
     sources = log_sources([str(tmp_path / "flights")])
     right = alone.replace(str(flights), str(tmp_path / "flights"))
