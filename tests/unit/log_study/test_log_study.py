@@ -139,6 +139,39 @@ def test_logs_are_fetched_from_wherever_fsspec_finds_them(flights: Path) -> None
     assert near.findings[Study.DETECT].outcome is not Outcome.FAILED
 
 
+def test_of_a_folder_of_many_logs_only_what_belongs_to_one_is_fetched(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from fsspec.implementations.memory import MemoryFileSystem
+
+    files, read = MemoryFileSystem(), list[str]()
+    beside = {"summary.json", "truth.mcap", "inventory.db", "inventory.db-wal", "evidence/ab/abcd.jpg"}
+    opened = MemoryFileSystem.open
+
+    def noted(self: Any, path: str, mode: str = "rb", **how: Any) -> Any:
+        read.extend([path] if mode == "rb" else [])
+        return opened(self, path, mode, **how)
+
+    logs = {f"{n} [north].mcap" for n in range(5)}
+    for name in (*logs, *beside, "notes.txt", "a/flight.mcap", "a/summary.json"):
+        files.pipe_file(f"/flat/{name}", f"what is in {name}".encode())
+    monkeypatch.setattr(MemoryFileSystem, "open", noted)
+    try:
+        sources = log_sources(["memory://flat"])
+        assert len(sources) == 6
+        assert read == []
+        for source in sources:
+            read.clear()
+            with source.fetched() as log:
+                here = {str(path.relative_to(log.parent)) for path in log.parent.rglob("*") if path.is_file()}
+                assert log.read_text() == "what is in " + source.place.removeprefix("memory:///flat/")
+            alone = {"flight.mcap", "summary.json"}
+            assert here == (alone if source.place.endswith("/a/flight.mcap") else {log.name, *beside})
+            assert len(read) == len(here)
+    finally:
+        files.rm("/flat", recursive=True)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
