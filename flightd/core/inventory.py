@@ -38,7 +38,7 @@ class Standing(enum.IntEnum):
     """The place that it was seen at is not proven yet."""
     CONFIRMED = 1
     WITHDRAWN = 2
-    """Where the drone was, was contradicted: it may have been another place."""
+    """Where the drone was, was contradicted: it may have been another place; or what it saw, elsewhere."""
 
 
 @dataclass(frozen=True, slots=True)

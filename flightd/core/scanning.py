@@ -144,7 +144,14 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """Locations whose pending findings are proven to be theirs, or withdrawn because they may not be."""
+    """Locations whose pending findings are proven to be theirs, or withdrawn because they may not be.
+
+    `booked`: what this count has proven of them before is withdrawn, too, for something contradicts it."""
 
     locations: tuple[str, ...]
     confirmed: bool
+    booked: bool = False
+
+    def __post_init__(self) -> None:
+        if self.confirmed and self.booked:
+            raise ValueError(f"{', '.join(self.locations)}: proven and contradicted at once")

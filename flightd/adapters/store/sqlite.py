@@ -3,7 +3,7 @@
 One observation is one transaction, so a power cut loses at most the location in work.  Observations are
 named by their content and only ever added; a location's state is that of its newest confirmed one.  One
 that is pending (the place it was seen at is not proven yet) counts for nothing; it is confirmed or
-withdrawn once, and withdrawn wins.  So writing the same again, or merging another drone's file in any
+withdrawn, a confirmed one is withdrawn where something contradicts it, and withdrawn wins.  So writing the same again, or merging another drone's file in any
 order, ends in the same inventory.
 """
 
@@ -241,6 +241,15 @@ class SqliteStore:
             self._db.executemany(
                 "UPDATE observation SET standing = ? WHERE location = ? AND run = ? AND standing = ?",
                 [(standing, location, run, Standing.PENDING) for location in locations],
+            )
+
+    def contradict(self, run: str, locations: Iterable[str]) -> None:
+        """Withdraw every look of a run at these locations, confirmed ones, too: they stay in the history, and
+        the run has not counted there."""
+        with self._transaction():
+            self._db.executemany(
+                "UPDATE observation SET standing = ? WHERE location = ? AND run = ?",
+                [(Standing.WITHDRAWN, location, run) for location in locations],
             )
 
     def withdraw_pending(self, run: str) -> None:

@@ -74,6 +74,7 @@ class Counting:
         """Hand a tick's findings to the inventory."""
         for finding in output.findings:
             self._findings[finding.location] = finding
+            self._confirmed.discard(finding.location)
             if self._writer is not None:
                 self._writer.put(finding, self._watch.evidence(finding.evidence))
         for settled in output.settled:

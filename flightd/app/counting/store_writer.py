@@ -136,7 +136,10 @@ class StoreWriter:
     def _write(self, entry: tuple[Finding, bytes] | Settled) -> str:
         """The id of the observation that was written, if one was."""
         if isinstance(entry, Settled):
-            self._store.settle(self._run, entry.locations, entry.confirmed)
+            if entry.booked:
+                self._store.contradict(self._run, entry.locations)
+            else:
+                self._store.settle(self._run, entry.locations, entry.confirmed)
             return ""
         finding, jpeg = entry
         evidence = self._store.keep_evidence(jpeg) if jpeg else ""

@@ -191,6 +191,23 @@ def test_what_views_leave_open_is_visited_by_stopping_in_the_best_order() -> Non
     assert "nodes that are not flown past" not in times
 
 
+def test_what_is_booked_is_withdrawn_at_once_where_its_code_is_found_elsewhere() -> None:
+    """Location labels prove each place in passing; the flight ends before both are looked at again."""
+    one, other = "AL-02-2-2", "AR-04-1-1"
+    labels = labels_of(SITE) | {code: [Label("PALLET 1")] for code in (one, other)}
+    stock = Stock({code: [*found, Label(code, -0.15)] for code, found in labels.items()})
+    flight = Sweep(stock=stock)
+    flight.fly(until=lambda: bool(flight.said("contradiction")))
+    booked: set[str] = set()
+    for settled in flight.settled:
+        if settled.confirmed:
+            booked |= set(settled.locations)
+        elif settled.booked:
+            booked -= set(settled.locations)
+    assert len(booked) > 4
+    assert not booked & {one, other}
+
+
 def test_aisle_after_aisle_is_flown_past_with_one_half_turn_each_and_no_way_out_to_bare_ends() -> None:
     flight = Sweep(config().with_values(camera={"mount_yaw_deg": 90.0}), site=BARE_ENDS)
     flight.fly(600.0)

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import LocationState, Observation, PlaceFill, PlannedLocation
+from flightd.core.inventory import LocationState, Observation, PlaceFill, PlannedLocation, Standing
 from flightd.core.types import CodeRead
 from flightd.ports import Store
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
@@ -229,6 +229,27 @@ def test_a_pending_look_counts_for_nothing_until_it_is_confirmed(tmp_path: Path)
         store.settle(second.run, [second.location], confirmed=True)
         assert newest(store, first.location) == second.id
         assert store.counted(first.run) == {first.location}
+
+
+def test_a_booked_place_that_is_contradicted_is_counted_no_more_and_keeps_its_history(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as store:
+        seen, again, other = look(1), look(51), look(2)
+        assert (seen.location, seen.run) == (again.location, again.run)
+        for one in (seen, other):
+            store.commit(one)
+        store.contradict(seen.run, [seen.location])
+        assert seen.location not in store.counted(seen.run), "the run's remainder looks there again"
+        assert newest(store, seen.location) is None
+        assert newest(store, other.location) == other.id
+        assert [kept.id for kept in store.history(seen.location)] == [seen.id]
+        store.commit(again, confirmed=False)
+        store.settle(again.run, [again.location], confirmed=True)
+        store.commit(seen)
+        assert newest(store, seen.location) == again.id
+        assert [standing for _, standing in store.looks(seen.location)] == [
+            Standing.WITHDRAWN,
+            Standing.CONFIRMED,
+        ]
 
 
 def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path: Path) -> None:
