@@ -20,7 +20,7 @@ from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, ShelfLook, Sighting
-from flightd.mission.scan.code_identity import names_one_thing
+from flightd.mission.scan.code_owners import CodeOwners
 from flightd.mission.scan.face_light import USUAL, Face, FaceLight, LegLight
 from flightd.mission.scan.label_checks import LabelChecks
 from flightd.mission.scan.node_scan import ScanTask
@@ -65,7 +65,7 @@ class Scanner:
         self._light = FaceLight(params.expert.darker, params.expert.brighter, params.sweep.most_gain)
         self._shot = USUAL
         self._swept: set[str] = set()
-        self._owners: dict[str, str] = {}
+        self._owners = CodeOwners()
         self._aisle_of = {node.id: node.aisle for node in site.nodes.values()}
         self._planned = self._wanted = frozenset(site.locations)
         self._levels = {location.code: location.level for location in site.locations.values()}
@@ -164,7 +164,7 @@ class Scanner:
         self.leave()
         self._done.clear()
         self._swept.clear()
-        self._owners.clear()
+        self._owners = CodeOwners()
         self._begun = self._begun_blind = 0
 
     def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
@@ -235,7 +235,7 @@ class Scanner:
         self._break_off()
         codes = self._pending.withdraw()
         self._done.difference_update(codes)
-        self._owners = {text: code for text, code in self._owners.items() if code not in codes}
+        self._owners.forget(codes)
         if codes or (self._labels.contradict and not self.doubted):
             text = f"{reason}; {len(codes)} findings withdrawn"
             self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
@@ -450,39 +450,33 @@ class Scanner:
         if self._task is None:
             return
         for found in self._task.drain():
-            self._found.append(found)
-            self._done.add(found.location)
             self._pending.add(found.location)
+            self._count(found)
 
     def _gather_sweep(self) -> None:
-        """Take what was decided in passing, unless it is at another place as well."""
+        """Take what was decided in passing."""
         assert self._sweep is not None
         for found in self._sweep.drain():
             self._swept.add(found.location)
-            others = self._elsewhere(found)
-            if others:
-                self._sweep.undecided[found.location] = Undecided.ELSEWHERE
-                self._recall(found, others)
-                continue
-            self._owners.update((read.text, found.location) for read in found.reads)
-            self._found.append(found)
-            self._done.add(found.location)
             self._pending.add_at(found.node, found.location)
+            again = self._count(found)
+            self._sweep.undecided.update(dict.fromkeys(again, Undecided.ELSEWHERE))
         self._swept.update(self._sweep.undecided)
 
-    def _elsewhere(self, found: Finding) -> set[str]:
-        """The places at which this flight has found the same single thing."""
-        texts = (read.text for read in found.reads if names_one_thing(read))
-        return {self._owners[text] for text in texts if text in self._owners} - {found.location}
-
-    def _recall(self, found: Finding, others: Iterable[str]) -> None:
-        """One thing cannot be at two places: both are counted again, by stopping."""
-        for other in others:
-            if other in self._done:
-                self._pending.recall(other)
-                self._done.discard(other)
-                text = f"one code at {other} and {found.location}: both are looked at again"
-                self._events.append(Event(found.stamp_ns, EventLevel.WARNING, "contradiction", text))
+    def _count(self, found: Finding) -> frozenset[str]:
+        """A finding, whichever way it came.  The places that it takes back, maybe its own: they are counted
+        again, by stopping."""
+        self._found.append(found)
+        self._done.add(found.location)
+        against = self._owners.take(found)
+        if against is None:
+            return frozenset()
+        for place in against.again:
+            self._done.discard(place)
+            self._swept.add(place)
+            self._pending.recall(place, self._node_of[place])
+        self._events.append(Event(found.stamp_ns, EventLevel.WARNING, "contradiction", str(against)))
+        return against.again
 
     def _passed_s(self, node: str, pace: Pace, levels: Sequence[int] | None) -> float:
         """A node's share of the time in which its aisle is counted in passing; 0 where it is not."""
