@@ -28,6 +28,7 @@ class NoScan:
     looking = False
     decided = 0
     sweeps = False
+    evidence: frozenset[str] = frozenset()
 
     def wants(self, _node: str) -> bool:
         return False

@@ -429,6 +429,14 @@ class Scanner:
         found, self._found = tuple(self._found), []
         return found, self._pending.drain()
 
+    @property
+    def evidence(self) -> frozenset[str]:
+        """The pictures that a finding names, or may name yet; no other one that was taken will be."""
+        named = [found.evidence for found in self._found]
+        for task in (self._task, self._sweep):
+            named += task.evidence if task is not None else ()
+        return frozenset(named)
+
     def drain_events(self) -> list[Event]:
         events, self._events = self._events, []
         return events

@@ -154,6 +154,11 @@ class SweepTask:
         return found
 
     @property
+    def evidence(self) -> tuple[str, ...]:
+        """The best pictures of what is not decided yet."""
+        return tuple(votes.evidence for votes in self._votes.values())
+
+    @property
     def why(self) -> Counter[Undecided]:
         """How many places are not decided, by the reason."""
         return Counter(self.undecided.values())
