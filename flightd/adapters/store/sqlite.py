@@ -41,13 +41,15 @@ from flightd.core.inventory import (
 from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
-_VERSION = 5
+_VERSION = 6
 _WITH_TEXTS = 3
 """The first format with module sizes and printed text."""
 _WITH_FILLS = 4
 """The first that says how full places are."""
-_READABLE = (2, 3, 4, _VERSION)
-"""Formats that are read as they are: nothing but that, and how much goods lean, is missing."""
+_WITH_LEAN = 5
+"""The first that says how much goods lean."""
+_READABLE = (2, 3, 4, 5, _VERSION)
+"""Formats that are read as they are: nothing but that, and which looks are second ones, is missing."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
 _TAKEN_OVER = {
@@ -55,6 +57,7 @@ _TAKEN_OVER = {
     2: ("ALTER TABLE code_read ADD COLUMN module_px REAL", *TEXT_TABLES),
     3: FILL_TABLES,
     4: LEAN_COLUMN,
+    5: ("ALTER TABLE observation ADD COLUMN again INTEGER NOT NULL DEFAULT 0",),
 }
 """What makes a file of each earlier format one of the next."""
 _SCHEMA = """
@@ -71,7 +74,8 @@ CREATE TABLE observation (
     confidence REAL NOT NULL CHECK (confidence BETWEEN 0 AND 1),
     node TEXT, x_m REAL, y_m REAL, height_m REAL, yaw_rad REAL,
     evidence TEXT NOT NULL,
-    standing INTEGER NOT NULL DEFAULT 1
+    standing INTEGER NOT NULL DEFAULT 1,
+    again INTEGER NOT NULL DEFAULT 0
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX newest ON observation (location, utc_ns, id);
 CREATE TABLE code_read (
@@ -286,10 +290,10 @@ class SqliteStore:
         self._db.execute("INSERT OR IGNORE INTO location VALUES (?, ?)", (seen.location, node))
         where = (pose.node, pose.x_m, pose.y_m, pose.height_m, pose.yaw_rad) if pose else (None,) * 5
         cursor = self._db.execute(
-            "INSERT OR IGNORE INTO observation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT OR IGNORE INTO observation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
                 seen.id, seen.run, seen.location, seen.utc_ns, seen.state.value, seen.confidence, *where,
-                seen.evidence, standing,
+                seen.evidence, standing, seen.again,
             ),
         )  # fmt: skip
         if cursor.rowcount == 0:
@@ -359,9 +363,10 @@ class SqliteStore:
             reads.setdefault(seen, []).append(read)
         texts = kept_texts(self._db) if self._version >= _WITH_TEXTS else {}
         with_fills = self._version >= _WITH_FILLS
-        fills = kept_fills(self._db, with_lean=self._version == _VERSION) if with_fills else {}
+        fills = kept_fills(self._db, with_lean=self._version >= _WITH_LEAN) if with_fills else {}
+        again = "again" if self._version == _VERSION else "0"
         rows = self._db.execute(
-            "SELECT id, run, location, utc_ns, state, confidence, evidence, "
+            f"SELECT id, run, location, utc_ns, state, confidence, evidence, {again}, "  # noqa: S608
             "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "
             "WHERE ?1 IS NULL OR location = ?1 ORDER BY utc_ns, id",
             (location,),
@@ -412,7 +417,8 @@ def _observation(
     texts: tuple[LabelValue, ...],
     fill: PlaceFill | None,
 ) -> Observation:
-    _, run, location, utc_ns, state, confidence, evidence, node, *place = row
+    _, run, location, utc_ns, state, confidence, evidence, again, node, *place = row
     pose = None if node is None else CountPose(node, *place)
     seen = LocationState(state)
-    return Observation(run, location, utc_ns, seen, confidence, reads, pose, evidence, texts, fill)
+    looked = run, location, utc_ns, seen, confidence, reads, pose, evidence, texts, fill
+    return Observation(*looked, again=bool(again))

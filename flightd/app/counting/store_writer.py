@@ -150,9 +150,8 @@ class StoreWriter:
     def _observation(self, f: Finding, evidence: str) -> Observation:
         pose = CountPose(f.node, f.x_m, f.y_m, f.height_m, f.yaw_rad)
         utc_ns = self._utc_at_zero_ns + f.stamp_ns
-        return Observation(
-            self._run, f.location, utc_ns, f.state, f.confidence, f.reads, pose, evidence, fill=f.fill
-        )
+        looked = self._run, f.location, utc_ns, f.state, f.confidence, f.reads, pose, evidence
+        return Observation(*looked, fill=f.fill, again=f.again)
 
     def _tell(self, text: str) -> None:
         now_ns = self._clock.now_ns()

@@ -459,7 +459,7 @@ class Scanner:
             return
         for found in self._task.drain():
             self._pending.add(found.location)
-            self._count(found)
+            self._count(replace(found, again=found.location in self._swept))
 
     def _gather_sweep(self) -> None:
         """Take what was decided in passing."""

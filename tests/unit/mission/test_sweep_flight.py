@@ -181,6 +181,7 @@ def test_what_views_leave_open_is_visited_by_stopping_in_the_best_order() -> Non
     ]
     found = [finding.location for finding in flight.findings]
     assert [found.count(code) for code in sorted(twice)] == [2, 2], "in passing, and at a stop"
+    assert {finding.location for finding in flight.findings if finding.again} == burnt | twice
     withdrawn = [code for one in flight.settled if not one.confirmed for code in one.locations]
     assert sorted(withdrawn) == sorted(twice)
     # it ends its legs over A1, where the pad is: there is no way but out and back

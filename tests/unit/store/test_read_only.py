@@ -69,13 +69,15 @@ def test_a_log_without_its_index_is_left_to_a_writer(tmp_path: Path) -> None:
         assert "inventory.db-shm" not in files(tmp_path)
 
 
-@pytest.mark.parametrize("version", [2, 3, 4])
+@pytest.mark.parametrize("version", [2, 3, 4, 5])
 def test_a_store_of_a_format_before_is_read_as_it_is(tmp_path: Path, version: int) -> None:
-    seen = replace(EMPTY, fill=PlaceFill(0.0)) if version == 4 else EMPTY
+    seen = replace(EMPTY, fill=PlaceFill(0.0)) if version >= 4 else EMPTY
     with SqliteStore(tmp_path) as writer:
         writer.commit(seen)
     with sqlite3.connect(tmp_path / "inventory.db") as older:
-        older.execute("ALTER TABLE place_fill DROP COLUMN lean_m")
+        older.execute("ALTER TABLE observation DROP COLUMN again")
+        if version < 5:
+            older.execute("ALTER TABLE place_fill DROP COLUMN lean_m")
         if version < 4:
             older.execute("DROP TABLE place_fill")
         if version == 2:

@@ -231,6 +231,16 @@ def test_a_pending_look_counts_for_nothing_until_it_is_confirmed(tmp_path: Path)
         assert store.counted(first.run) == {first.location}
 
 
+def test_which_looks_were_second_ones_is_read_back_and_merged(tmp_path: Path) -> None:
+    looks = [look(1), replace(look(2), again=True)]
+    with SqliteStore(tmp_path / "a") as store, SqliteStore(tmp_path / "b") as other:
+        for seen in looks:
+            store.commit(seen)
+        other.merge(store)
+        assert [seen.again for seen, _ in store.looks()] == [False, True]
+        assert other.looks() == store.looks()
+
+
 def test_a_booked_place_that_is_contradicted_is_counted_no_more_and_keeps_its_history(tmp_path: Path) -> None:
     with SqliteStore(tmp_path) as store:
         seen, again, other = look(1), look(51), look(2)
@@ -267,10 +277,11 @@ def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path:
         assert [kept.id for kept in other.history(seen.location)] == [seen.id]
 
 
-TO_4 = ("ALTER TABLE place_fill DROP COLUMN lean_m",)
-TO_3 = ("DROP TABLE place_fill",)
+TO_5 = ("ALTER TABLE observation DROP COLUMN again",)
+TO_4 = (*TO_5, "ALTER TABLE place_fill DROP COLUMN lean_m")
+TO_3 = (*TO_5, "DROP TABLE place_fill")
 TO_2 = (*TO_3, "ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
-OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2, 3: TO_3, 4: TO_4}
+OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2, 3: TO_3, 4: TO_4, 5: TO_5}
 
 
 @pytest.mark.parametrize("version", OLDER)
