@@ -3,8 +3,8 @@
 One observation is one transaction, so a power cut loses at most the location in work.  Observations are
 named by their content and only ever added; a location's state is that of its newest confirmed one.  One
 that is pending (the place it was seen at is not proven yet) counts for nothing; it is confirmed or
-withdrawn, a confirmed one is withdrawn where something contradicts it, and withdrawn wins.  So writing the same again, or merging another drone's file in any
-order, ends in the same inventory.
+withdrawn.  A confirmed one is withdrawn where something contradicts it, and withdrawn wins.  So writing the
+same again, or merging another drone's file in any order, ends in the same inventory.
 """
 
 from __future__ import annotations

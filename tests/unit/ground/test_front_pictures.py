@@ -101,7 +101,7 @@ class Named:
 
 
 def test_the_best_picture_of_a_place_is_kept_for_as_long_as_it_may_be_asked_for() -> None:
-    """However long its place is looked at: 30 frames a second with eight places each are a thousand in 4 s."""
+    """However long its place is looked at: 30 frames a second with eight places each are 1,000 in 4 s."""
 
     async def look() -> ShelfWatch:
         watch = ShelfWatch(Named(), lambda _: (PLACE,))
