@@ -40,6 +40,9 @@ _MIN_SIDE, _MIN_BUSY_SIDE = 8, 5
 _MIN_PIECE_PX = 500.0
 _MIN_EVIDENCE_PX = 1800.0
 """A code of 25 modules read at 2.5 pixels for each covers as much; the corner of a box less."""
+_LEAST_PART, _LEAST_PIECE_PART = 0.06, 0.05
+"""Evidence as a part of a region's area, margins included, and of a single piece's: codes have 0.07 and 0.06
+at least, what the edges of goods and racks happen to add up to 0.05 and 0.04 at most."""
 _MARGIN = 0.25
 _QUIET = 0.15
 _BUSY_DENSITY = 0.22
@@ -60,6 +63,10 @@ class CodeRegion:
     x1: int
     y1: int
     evidence: float
+
+    @property
+    def area(self) -> int:
+        return (self.x1 - self.x0) * (self.y1 - self.y0)
 
     def touches(self, other: CodeRegion) -> bool:
         return self.x0 < other.x1 and other.x0 < self.x1 and self.y0 < other.y1 and other.y0 < self.y1
@@ -140,7 +147,7 @@ class CodeSearch:
             if min(w, h) >= _MIN_BUSY_SIDE:
                 pieces.append(fine.box(x, y, w, h, 0.0).widened(fine.quiet(w), fine.quiet(h)))
         found = [self._clipped(region) for region in _merged(pieces)]
-        area = sum((region.x1 - region.x0) * (region.y1 - region.y0) for region in found)
+        area = sum(region.area for region in found)
         return found if area < _MOST_BUSY * height * width else None
 
     def regions(self, known: Sequence[Matrix] = (), most: int = 4) -> list[CodeRegion]:
@@ -148,7 +155,8 @@ class CodeSearch:
         codes, (4, 2) corners each, explain."""
         boxes = [_surroundings(corners) for corners in known]
         pieces = [piece for layer in self._layers for piece in _pieces(layer, boxes)]
-        found = [self._clipped(one) for one in _merged(pieces) if one.evidence >= _MIN_EVIDENCE_PX]
+        whole = [part for one in _merged(pieces) for part in _dense(one, pieces)]
+        found = [self._clipped(one) for one in whole if one.evidence >= _MIN_EVIDENCE_PX]
         return sorted(found, key=lambda region: -region.evidence)[:most]
 
     def _clipped(self, r: CodeRegion) -> CodeRegion:
@@ -209,6 +217,13 @@ def _merged(regions: list[CodeRegion]) -> list[CodeRegion]:
                 whole = whole.joined(other)
         merged.append(whole)
     return merged
+
+
+def _dense(region: CodeRegion, pieces: Sequence[CodeRegion]) -> Sequence[CodeRegion]:
+    """A merged region, or those of its pieces that may be codes by themselves where all lie scattered."""
+    if region.evidence >= _LEAST_PART * region.area:
+        return (region,)
+    return [one for one in pieces if one.touches(region) and one.evidence >= _LEAST_PIECE_PART * one.area]
 
 
 def _layer(grey: Image, times: int, least_density: float) -> _Layer | None:
