@@ -52,12 +52,26 @@ class PlaceOpening:
     posts: tuple[bool, bool]
 
 
+@dataclass(frozen=True, slots=True, order=True)
+class PictureWorth:
+    """What a picture of a place is worth to people, compared in this order: whether it shows a code there,
+    whether the place comes out well, and how much of the place is in it (negative: there is no picture)."""
+
+    code: bool
+    lit: bool
+    share: float
+
+
+NO_PICTURE = PictureWorth(False, False, -1.0)
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """A location as the picture is expected to show it: its cell and how much of that is inside; the core of
     the cell, which goods cover if there are any; and the front part of the deck below the core, which an
     empty place shows (its far end above its near one; empty where it cannot be in the picture).  `opening` is
-    None where it is not in the picture."""
+    None where it is not in the picture.  `kept` is what the picture that there is of it is worth: none is made
+    that is worth no more."""
 
     location: str
     quad_px: Quad
@@ -65,11 +79,13 @@ class Place:
     core_px: Quad
     deck_px: Quad = ()
     opening: PlaceOpening | None = None
+    kept: PictureWorth = NO_PICTURE
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceLook:
-    """What one picture shows of one location; `evidence` names the picture of it (SHA-256) or is empty.
+    """What one picture shows of one location; `evidence` names the picture of it (SHA-256), empty
+    where none was made.
     `fill` is None where it shows too little of the opening."""
 
     location: str

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import combinations
 
 from flightd.core.inventory import LocationState, PlaceFill
-from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PlaceLook
+from flightd.core.scanning import NO_PICTURE, BodyPose, Finding, Light, Occupancy, PictureWorth, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
 from flightd.mission.scan.code_votes import CodeVotes
 from flightd.mission.scan.fill_votes import FillVotes
@@ -42,7 +42,8 @@ class LocationVotes:
         self._empty_in_a_row = self._most_empty = 0
         self._quiet = 0
         self._largest = 0.0
-        self._best: tuple[bool, float] = (False, -1.0)
+        self.kept = NO_PICTURE
+        """What the picture is worth that is kept as evidence."""
         self._evidence = ""
         self._pose: BodyPose | None = None
         self.light = Light.FAIR
@@ -97,9 +98,9 @@ class LocationVotes:
         self.light = place.light if place is not None else self.light
         self._largest = max(self._largest, place.share if place is not None else 0.0)
         if place is not None and place.evidence:
-            worth = bool(reads), place.share
-            if worth >= self._best:
-                self._best, self._evidence = worth, place.evidence
+            worth = PictureWorth(bool(reads), place.light is Light.FAIR, place.share)
+            if worth > self.kept:
+                self.kept, self._evidence = worth, place.evidence
 
     def finding(self, final: bool) -> Finding | None:
         """The state, None while more looks may still tell; `final` forces one, and is None only where no

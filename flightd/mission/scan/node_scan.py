@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flightd.config.scan import ScanConfig
-from flightd.core.scanning import Finding, Light, Occupancy
+from flightd.core.scanning import Finding, Light, Occupancy, PictureWorth
 from flightd.mission.scan.code_assignment import PlacedRead, ShelfLook
 from flightd.mission.scan.location_votes import LocationVotes
 from flightd.mission.scan.views import View, ViewPlanner
@@ -63,6 +63,10 @@ class ScanTask:
         if view is None or self._begun_ns is None:
             return ()
         return self._left(view)
+
+    def kept(self, code: str) -> PictureWorth:
+        """What the picture of an undecided location is worth that is kept of it."""
+        return self._open[code].kept
 
     def begin(self, now_ns: int) -> None:
         """The view is reached and the drone at rest."""

@@ -9,12 +9,12 @@ nothing is ever booked on a wrong location; its locations are left to count, and
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 
 from flightd.config.scan import ScanConfig
 from flightd.core.planned_flight import PlannedSweep
-from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
+from flightd.core.scanning import BodyPose, CodeSet, Finding, PictureWorth, Place, Settled
 from flightd.core.types import Event, EventLevel
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.sweep_leg import SweepLeg
@@ -367,11 +367,17 @@ class Scanner:
         """The places wanted in a picture taken at `pose`; none for one that would not count."""
         passing = self._passing
         if passing is not None:
-            return self._assigner.places(pose, passing.near(pose)) if pose.certain else ()
+            return self._places(pose, passing.near(pose), passing.kept) if pose.certain else ()
         task = self._task
         if task is None or task.since_ns is None or pose.stamp_ns < task.since_ns or not pose.certain:
             return ()
-        return self._assigner.places(pose, task.looking)
+        return self._places(pose, task.looking, task.kept)
+
+    def _places(
+        self, pose: BodyPose, codes: Iterable[str], kept: Callable[[str], PictureWorth]
+    ) -> tuple[Place, ...]:
+        places = self._assigner.places(pose, codes)
+        return tuple(replace(place, kept=kept(place.location)) for place in places)
 
     def take(self, codes: CodeSet, pose: BodyPose) -> None:
         """One picture and the pose at its exposure."""

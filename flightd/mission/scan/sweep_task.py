@@ -9,7 +9,7 @@ from itertools import permutations
 
 from flightd.config.scan import ScanConfig
 from flightd.core.geometry import wrap_pi
-from flightd.core.scanning import BodyPose, Finding
+from flightd.core.scanning import NO_PICTURE, BodyPose, Finding, PictureWorth
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.code_assignment import PlacedRead, ShelfLook
 from flightd.mission.scan.sweep_votes import SweepVotes, Undecided
@@ -103,6 +103,11 @@ class SweepTask:
         """The locations that a picture taken at `pose` is wanted of: what is not decided."""
         leg = self.leg_at(pose)
         return () if leg is None else tuple(code for code in leg.locations if code not in self._closed)
+
+    def kept(self, code: str) -> PictureWorth:
+        """What the picture of a location is worth that is kept of it."""
+        votes = self._votes.get(code)
+        return NO_PICTURE if votes is None else votes.kept
 
     def take(self, look: ShelfLook) -> None:
         """One picture."""

@@ -14,7 +14,7 @@ from itertools import combinations
 
 from flightd.config.scan import ScanConfig
 from flightd.core.inventory import LocationState
-from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PlaceLook
+from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PictureWorth, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
 from flightd.mission.scan.location_votes import SEEN_EMPTY, LocationVotes
 
@@ -99,6 +99,13 @@ class SweepVotes:
     def evidence(self) -> str:
         """The name of the best picture of it so far; empty where there is none."""
         return self._votes.evidence
+
+    @property
+    def kept(self) -> PictureWorth:
+        """What the picture is worth that is kept as evidence, its share that of the whole place unless no
+        picture of this leg can show more."""
+        kept = self._votes.kept
+        return kept if kept.share >= 1.0 else replace(kept, share=kept.share * self._full_share)
 
     def verdict(self, others: Collection[str] = ()) -> Finding | Undecided:
         """What the views say together, asked when the place is out of the picture; `others` are the codes

@@ -10,12 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.scanning import PlaceOpening
 from flightd.core.types import Image
-from flightd.vision.shelf.opening_raster import BELOW_M, COLUMN_M, ROW_M, deck_strip_m
+from flightd.vision.shelf.opening_raster import BELOW_M, COLUMN_M, ROW_M, brightest, deck_strip_m
 
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
@@ -56,23 +57,22 @@ def deck_sight(raster: Image, white: float, opening: PlaceOpening) -> DeckSight:
     columns = raster.shape[1]
     ends_m = _ends_m(columns, opening)
     tone = _tone(raster, white, opening, ends_m)
-    is_lit, past = np.zeros(columns, np.bool_), np.zeros(columns, np.bool_)
     if tone is None:
-        return DeckSight(is_lit, past)
+        return DeckSight(np.zeros(columns, np.bool_), np.zeros(columns, np.bool_))
     colours = raster.astype(np.float32) / np.float32(white)
-    is_deck = np.abs(colours - tone).max(axis=2) < _SAME
-    is_dark = is_deck | (colours.max(axis=2) < _DARK * tone.max())
+    off = cv2.split(np.abs(colours - tone))
+    is_deck = cv2.max(cv2.max(off[0], off[1]), off[2]) < _SAME
+    is_dark = is_deck | (brightest(raster) / np.float32(white) < _DARK * tone.max())
     lit_m, all_m = (_needed_m(opening, np.minimum(ends_m, deep_m)) for deep_m in (_LIT_M, _DARK_M))
     wall_m = deck_strip_m(opening, _WALL_M) + _OFF_M
-    for column in range(columns):
-        edge = _edge(is_deck[:, column])
-        if edge is None:
-            is_lit[column] = lit_m[column] <= 0.0  # the end is too near for any deck
-            continue
-        is_lit[column] = lit_m[column] <= _run(is_deck[:, column], edge) * ROW_M <= wall_m
-        whole_m = _run(is_dark[:, column], edge) * ROW_M
-        past[column] = is_lit[column] and ends_m[column] < _BEHIND_M and whole_m >= all_m[column]
-    return DeckSight(is_lit, past)
+    edge, has_edge = _edge(is_deck)
+    strip_m, whole_m = (_run(flags, edge) * ROW_M for flags in (is_deck, is_dark))
+    is_lit = np.where(
+        has_edge,
+        (lit_m <= strip_m) & (strip_m <= wall_m),
+        lit_m <= 0.0,  # the end is too near for any deck
+    )
+    return DeckSight(is_lit, has_edge & is_lit & (ends_m < _BEHIND_M) & (whole_m >= all_m))
 
 
 def _ends_m(columns: int, opening: PlaceOpening) -> Floats:
@@ -105,16 +105,17 @@ def _needed_m(opening: PlaceOpening, deep_m: Floats) -> Floats:
     return np.asarray(eye_m * deep_m / (before_m + deep_m) - _SHORT_M, np.float64)
 
 
-def _edge(is_deck: Flags) -> int | None:
-    """The first row of the deck, None where it is not near its place."""
+def _edge(is_deck: Flags) -> tuple[NDArray[np.intp], Flags]:
+    """(columns,) the first row of the deck, and whether it is near its place at all."""
     deck, off = round(BELOW_M / ROW_M), round(_OFF_M / ROW_M)
     near = is_deck[deck - off : deck + off + 1]
-    both = np.flatnonzero(near[:-1] & near[1:])
-    return int(both[0]) + deck - off if both.size else None
+    both = near[:-1] & near[1:]
+    return both.argmax(axis=0) + deck - off, np.asarray(both.any(axis=0))
 
 
-def _run(flags: Flags, start: int) -> int:
-    """How many rows from there on are set, single ones left out."""
-    pairs = flags[start:-1] | flags[start + 1 :]
-    ends = np.flatnonzero(~pairs)
-    return int(ends[0]) if ends.size else len(pairs)
+def _run(flags: Flags, start: NDArray[np.intp]) -> NDArray[np.intp]:
+    """(columns,) how many rows from there on are set, single ones left out."""
+    rows = np.arange(len(flags))[:, None]
+    ends = np.ones(flags.shape, np.bool_)  # the last row always is one
+    ends[:-1] = ~(flags[:-1] | flags[1:])
+    return np.asarray((ends & (rows >= start)).argmax(axis=0) - start, np.intp)

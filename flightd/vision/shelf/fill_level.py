@@ -25,6 +25,7 @@ from flightd.vision.shelf.opening_raster import (
     BELOW_M,
     COLUMN_M,
     ROW_M,
+    brightest,
     deck_strip_m,
     in_columns,
     opening_raster,
@@ -121,7 +122,7 @@ def measure(
     if raster.shape[1] - left - right < _LEAST_COLUMNS:
         return UNKNOWN
     columns = slice(left, raster.shape[1] - right)
-    whole = raster.max(axis=2).astype(np.float32) / np.float32(white)
+    whole = brightest(raster).astype(np.float32) / np.float32(white)
     deck = round(BELOW_M / ROW_M)
     above = whole[deck + round(CLEAR_M / ROW_M) :, columns]
     tops_m = fronts_m(above, opening, left)

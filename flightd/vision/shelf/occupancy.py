@@ -11,7 +11,8 @@ case is `UNSURE`: an empty place is never guessed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -54,8 +55,7 @@ class CoreMeasures:
 
 def white_level(picture: Image) -> float:
     """The grey level of white paper in a picture, (H, W, 3) BGR; NaN where nothing is so light."""
-    grey = cv2.cvtColor(np.ascontiguousarray(picture[::4, ::4]), cv2.COLOR_BGR2GRAY)
-    white = float(np.percentile(grey, _WHITE_SHARE))
+    white = _lightest(picture)
     return white if white >= _LEAST_WHITE else float("nan")
 
 
@@ -65,16 +65,26 @@ def paper_level(picture: Image, codes: Sequence[Image]) -> float:
     labels = [float(np.percentile(cv2.cvtColor(code, cv2.COLOR_BGR2GRAY), _LABEL_SHARE)) for code in codes]
     if labels:
         return float(np.median(labels))
+    return _lightest(picture)
+
+
+def _lightest(picture: Image) -> float:
+    """The grey level that hardly anything in a picture, (H, W, 3) BGR, is above."""
     grey = cv2.cvtColor(np.ascontiguousarray(picture[::4, ::4]), cv2.COLOR_BGR2GRAY)
-    return float(np.percentile(grey, _WHITE_SHARE))
+    up_to = np.cumsum(cv2.calcHist([grey], [0], None, [256], [0, 256]).ravel())
+    rank = (grey.size - 1) * _WHITE_SHARE / 100
+    low, high = np.searchsorted(up_to, (math.floor(rank), math.ceil(rank)), side="right")
+    return float(low + (high - low) * (rank % 1.0))
 
 
 def light_on(cell: Image, white: float) -> Light:
     """How a cell, (H, W, 3) BGR, comes out in a picture of that white level."""
     if not white >= _LEAST_WHITE:
         return Light.DIM
-    burnt = cell.size > 0 and float((cell.min(axis=2) >= _BURNT).mean()) > _BURNT_PART
-    return Light.BURNT if burnt else Light.FAIR
+    if not cell.size:
+        return Light.FAIR
+    burnt = cv2.countNonZero(cv2.inRange(cell, (_BURNT,) * 3, (255,) * 3))
+    return Light.BURNT if burnt > _BURNT_PART * cell.shape[0] * cell.shape[1] else Light.FAIR
 
 
 def measure(core: Image, white: float) -> CoreMeasures:
@@ -90,13 +100,14 @@ def measure(core: Image, white: float) -> CoreMeasures:
     return CoreMeasures(dark, float(steep.mean()), float(fine.std()) / white)
 
 
-def judge(core: Image, white: float, sees_deck: bool) -> Occupancy:
-    """What the core of one cell shows; `sees_deck`: the deck before it is seen (`deck.is_seen`)."""
+def judge(core: Image, white: float, sees_deck: Callable[[], bool]) -> Occupancy:
+    """What the core of one cell shows; `sees_deck`: the deck before it is seen (`deck.is_seen`), asked only
+    where that matters."""
     if min(core.shape[:2]) < _SMALLEST_PX or not white >= _LEAST_WHITE:
         return Occupancy.UNSURE
     seen = measure(core, white)
     if seen.dark > _EMPTY_DARK and seen.edges < _EMPTY_EDGES:
-        return Occupancy.EMPTY if sees_deck and seen.grain > _LEAST_GRAIN else Occupancy.UNSURE
+        return Occupancy.EMPTY if seen.grain > _LEAST_GRAIN and sees_deck() else Occupancy.UNSURE
     if seen.dark < _GOODS_DARK and seen.edges < _COVER_EDGES:
         return Occupancy.COVERED
     return Occupancy.GOODS if seen.dark < _GOODS_DARK or seen.edges > 2 * _EMPTY_EDGES else Occupancy.UNSURE

@@ -34,6 +34,12 @@ def onto_opening(points_px: Matrix, opening: PlaceOpening) -> Matrix:
     return np.asarray(cv2.perspectiveTransform(points_px[None].astype(np.float64), onto)[0], np.float64)
 
 
+def brightest(bgr: Image) -> Image:
+    """(H, W) of a picture, (H, W, 3) BGR: the largest of each pixel's three parts."""
+    blue, green, red = cv2.split(bgr)
+    return np.asarray(cv2.max(cv2.max(blue, green), red), np.uint8)
+
+
 def in_columns(square: Image) -> Image:
     """(rows, columns, 3) BGR of an opening's raster with `COLUMN_M` to a column."""
     size = round(square.shape[1] * ROW_M / COLUMN_M), square.shape[0]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TypeAlias
 
 import cv2
 import numpy as np
 
 from flightd.core.inventory import PlaceFill
-from flightd.core.scanning import CodeSet, Occupancy, Place, PlaceLook, Quad
+from flightd.core.scanning import CodeSet, Light, Occupancy, PictureWorth, Place, PlaceLook, Quad
 from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf import empty_deck as deck
 from flightd.vision.shelf.code_reader import read_codes
@@ -34,7 +35,8 @@ def read_shelf(
     exposure: float = 1.0,
     gain: float = 1.0,
 ) -> tuple[CodeSet, dict[str, bytes]]:
-    """The codes and the places of one picture, (H, W, 3) BGR; the evidence of each place by its name.
+    """The codes and the places of one picture, (H, W, 3) BGR; the evidence by its name, of each place of
+    which the picture is worth more than what is kept.
 
     Only the part of the picture with the places is read.
     """
@@ -99,16 +101,20 @@ def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> 
     """What one place shows, and its picture."""
     height, width = bgr.shape[:2]
     occupancy = Occupancy.UNSURE
-    if any(_contains(place, read) for read in reads):
+    # in its core: a code below may be the shelf's own label
+    if any(_contains(place.core_px, read) for read in reads):
         occupancy = Occupancy.GOODS
     elif _is_inside(place.core_px, width, height):
         x0, y0, x1, y1 = _box(place.core_px, width, height)
         core = bgr[y0:y1, x0:x1]
-        occupancy = judge(core, white, deck.is_seen(bgr, place.deck_px, core, white))
+        occupancy = judge(core, white, partial(deck.is_seen, bgr, place.deck_px, core, white))
     x0, y0, x1, y1 = _box(place.quad_px, width, height)
-    jpeg = evidence_jpeg(np.ascontiguousarray(bgr[y0:y1, x0:x1])) if x1 > x0 and y1 > y0 else b""
-    name = picture_name(jpeg) if jpeg else ""
     light = light_on(bgr[y0:y1, x0:x1], white)
+    has_code = any(_contains(place.quad_px, read) for read in reads)
+    is_better = PictureWorth(has_code, light is Light.FAIR, place.share) > place.kept
+    seen = x1 > x0 and y1 > y0
+    jpeg = evidence_jpeg(np.ascontiguousarray(bgr[y0:y1, x0:x1])) if is_better and seen else b""
+    name = picture_name(jpeg) if jpeg else ""
     opening = _opening(bgr, place, reads, white)
     fill = None if opening is None else opening.fill
     if occupancy is Occupancy.EMPTY:
@@ -139,8 +145,7 @@ def _is_inside(quad: Quad, width: int, height: int) -> bool:
     return all(abs(x) <= (width - 1) / 2 and abs(y) <= (height - 1) / 2 for x, y in quad)
 
 
-def _contains(place: Place, read: CodeRead) -> bool:
-    """Whether a code is in the core of a place: one below may be the shelf's own label."""
+def _contains(quad: Quad, read: CodeRead) -> bool:
+    """Whether the middle of a code is in a part of the picture."""
     x, y = np.array(read.corners_px).mean(axis=0)
-    core = np.array(place.core_px, np.float32)
-    return cv2.pointPolygonTest(core, (float(x), float(y)), False) >= 0
+    return cv2.pointPolygonTest(np.array(quad, np.float32), (float(x), float(y)), False) >= 0
