@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from flightd.app.flight import Tasks
 from flightd.core.planned_flight import Planner
@@ -125,6 +125,14 @@ class NoCounting:
 
     def keep(self, output: TickOutput) -> None:
         pass
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        return {}
+
+    @property
+    def replaced(self) -> int:
+        return 0
 
 
 class NothingKept:

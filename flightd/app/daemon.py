@@ -42,6 +42,8 @@ class FlightResult:
     frames_dropped: int
     latency_ms: dict[str, float]
     setpoint_interval_ms: dict[str, float] = field(default_factory=dict)
+    dropped: dict[str, int] = field(default_factory=dict)
+    restarts: dict[str, int] = field(default_factory=dict)
 
     @property
     def nodes_done(self) -> int:
@@ -167,6 +169,8 @@ class Daemon:
             frames_dropped=sum(flight.vision.dropped.values()),
             latency_ms=flight.vision.latency_quantiles_ms(),
             setpoint_interval_ms=flight.setpoints.interval_quantiles_ms(),
+            dropped=self._tick.dropped,
+            restarts=self._tick.restarts,
         )
 
 

@@ -114,6 +114,16 @@ class Count(Protocol):
         """Hand a tick's findings to the inventory."""
         ...
 
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """What was lost on the way, by where."""
+        ...
+
+    @property
+    def replaced(self) -> int:
+        """Readers that died or hung and were replaced."""
+        ...
+
 
 class Fitness(Protocol):
     """Whether this computer is fit for a flight."""

@@ -32,6 +32,31 @@ class Tick:
         """What the newest tick answered."""
         return self._step.output
 
+    @property
+    def dropped(self) -> dict[str, int]:
+        """What full queues and lost workers have cost since the start, by their names."""
+        flight = self._flight
+        dropped = {
+            **flight.vision.dropped,
+            "recorder": flight.recorder.dropped,
+            "refused": flight.camera.refused + flight.front_camera.refused,
+            "setpoints": flight.setpoints.failed,
+            **flight.counting.dropped,
+        }
+        if self._counts_drops is not None:
+            dropped["vehicle"] = self._counts_drops.dropped
+        return dropped
+
+    @property
+    def restarts(self) -> dict[str, int]:
+        """What has died and was brought back since the start, by the part's name."""
+        flight = self._flight
+        return {
+            "detector": flight.vision.replaced,
+            "reader": flight.counting.replaced,
+            "recorder": flight.recorder.restarts,
+        }
+
     def order(self, command: Command) -> None:
         """Hand an operator's order to the next tick."""
         self._orders.append(command)
@@ -115,26 +140,20 @@ class Tick:
 
     def _snapshot(self, tick: TickInput, output: TickOutput, late_s: float) -> Snapshot:
         flight, pilot, call = self._flight, self._flight.pilot, self._call
-        vision, dropped = flight.vision, dict(flight.vision.dropped)
-        lost = sum(dropped.values())
-        dropped["recorder"] = flight.recorder.dropped
-        dropped["refused"] = flight.camera.refused + flight.front_camera.refused
-        dropped["setpoints"] = flight.setpoints.failed
-        if self._counts_drops is not None:
-            dropped["vehicle"] = self._counts_drops.dropped
+        vision = flight.vision
         return Snapshot(
             tick,
             output,
             nodes_done=call("mission", lambda: len(set(pilot.mission.visited)), 0),
             nodes_planned=pilot.plan.nodes,
             frames=flight.camera.frames,
-            frames_dropped=lost,
+            frames_dropped=sum(vision.dropped.values()),
             fps=vision.fps,
             latency_ms=vision.latency_ms,
             tick_late_s=(late_s,),
             latencies_ms=vision.drain_latencies_ms(),
-            dropped=dropped,
-            restarts={"detector": tick.health.detectors_replaced, "recorder": tick.health.recorder_restarts},
+            dropped=self.dropped,
+            restarts=self.restarts,
             repeated_level=flight.setpoints.stale,
             possible=call("mission", self._possible_commands, frozenset()),
             failure=self._step.failure,

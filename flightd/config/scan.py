@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Self
+import os
+from typing import Final, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from flightd.config.label_text import LabelTextConfig
 from flightd.config.section import Section, unit
 from flightd.config.sweep import ScanMode, SweepConfig
+
+_MOST_WORKERS: Final = 16
+_OTHER_CORES: Final = 2
+"""What the control loop and the detectors take."""
 
 
 class ScanExpert(Section):
@@ -76,11 +81,21 @@ class ScanConfig(Section):
     confirm_stops: int = Field(
         2, ge=1, le=20, description="nodes reached without a doubt until a node's count is booked"
     )
-    workers: int = Field(1, ge=1, le=16, description="code reader processes")
+    workers: int = Field(
+        1,
+        ge=0,
+        le=_MOST_WORKERS,
+        description="code reader processes; 0: one for each of the computer's cores but two, at least one",
+    )
     timeout_s: float = Field(3.0, gt=0.05, le=30, description="a reader that takes longer is replaced")
     sweep: SweepConfig = SweepConfig()
     expert: ScanExpert = ScanExpert()
     text: tuple[LabelTextConfig, ...] = ()
+
+    @field_validator("workers")
+    @classmethod
+    def _as_cores_allow(cls, workers: int) -> int:
+        return workers or min(max((os.cpu_count() or 1) - _OTHER_CORES, 1), _MOST_WORKERS)
 
     @model_validator(mode="after")
     def _heights_in_order(self) -> Self:

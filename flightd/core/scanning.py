@@ -70,8 +70,8 @@ class Place:
     """A location as the picture is expected to show it: its cell and how much of that is inside; the core of
     the cell, which goods cover if there are any; and the front part of the deck below the core, which an
     empty place shows (its far end above its near one; empty where it cannot be in the picture).  `opening` is
-    None where it is not in the picture.  `kept` is what the picture that there is of it is worth: none is made
-    that is worth no more."""
+    None where it is not in the picture.  `kept` is what the picture is worth that there is of it: none is
+    made that is worth no more."""
 
     location: str
     quad_px: Quad

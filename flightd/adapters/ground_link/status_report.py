@@ -60,6 +60,8 @@ def status_report(snapshot: Snapshot, session: str, seq: int, link: LinkReport) 
         plan=snapshot.outlook.plan,
         waits_at=snapshot.outlook.waits_at,
         lands_at=snapshot.outlook.lands_at,
+        dropped=dict(snapshot.dropped),
+        restarts=dict(snapshot.restarts),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -45,10 +46,15 @@ _MUCH_EVIDENCE = 500
 _MOST_SETS = 50
 _SHOWN_PX, _SHOWN_QUALITY = 960, 80
 """Width and quality of a picture for people."""
+_NICE = 5
+"""Readers yield to the control loop and the detectors: a frame that is read late costs a stop at worst."""
 
 
 class Readers(Protocol):
-    """Frames in, codes and places out, somewhere else."""
+    """Frames in, codes and places out, somewhere else; `replaced` of them died or hung."""
+
+    @property
+    def replaced(self) -> int: ...
 
     async def read(self, ticket: FrameTicket, wanted: Wanted) -> Reading | None: ...
 
@@ -75,6 +81,7 @@ def _shown(bgr: Image) -> bytes:
 
 
 def _shelf_reader() -> Work[Wanted, Reading]:
+    os.nice(_NICE)
     return read_frame
 
 

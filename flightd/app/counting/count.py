@@ -30,6 +30,7 @@ class Counting:
         counted: frozenset[str] = frozenset(),
         texts: TextSearcher | None = None,
     ) -> None:
+        self._readers = readers
         self._watch = ShelfWatch(readers, _nothing)
         self._workers = workers
         self._writer = writer
@@ -88,6 +89,23 @@ class Counting:
                     self._findings.pop(location, None)
             if self._writer is not None:
                 self._writer.settle(settled)
+
+    @property
+    def dropped(self) -> dict[str, int]:
+        """Frames that no reader had time for (`front_camera`) or that were lost in one (`reading`); findings
+        and their pictures for which the inventory had no room (`findings`, `pictures`)."""
+        writer = self._writer
+        return {
+            "front_camera": self._watch.frames.dropped,
+            "reading": self._watch.lost,
+            "findings": 0 if writer is None else writer.dropped,
+            "pictures": 0 if writer is None else writer.pictures_dropped,
+        }
+
+    @property
+    def replaced(self) -> int:
+        """Readers that died or hung and were replaced."""
+        return self._readers.replaced
 
     def places(self) -> tuple[dict[str, str], ...]:
         """What this flight has counted so far, location by location, for people."""

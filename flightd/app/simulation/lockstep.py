@@ -51,6 +51,10 @@ class LockstepReaders:
         self._latency_s = latency_s
         self._hold = hold
 
+    @property
+    def replaced(self) -> int:
+        return self._inner.replaced
+
     async def read(self, ticket: FrameTicket, wanted: Wanted) -> Reading | None:
         work = asyncio.ensure_future(self._inner.read(ticket, wanted))
         try:

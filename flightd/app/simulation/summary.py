@@ -31,6 +31,8 @@ def write_results(
         "faults": [asdict(fault) for fault in judgement.faults],
         "frames": result.frames,
         "frames_dropped": result.frames_dropped,
+        "dropped": result.dropped,
+        "restarts": result.restarts,
         "latency_ms": result.latency_ms,
         "setpoint_interval_ms": result.setpoint_interval_ms,
         "wall_time_s": round(wall_s, 2),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from dataclasses import replace
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.core.scanning import CodeSet, Occupancy
+from flightd.core.scanning import CodeSet, Occupancy, PictureWorth
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, ShelfLook
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
@@ -46,6 +47,19 @@ def truth() -> dict[str, LocationTruth]:
 
 Looks = list[tuple[CodeSet, ShelfLook, dict[str, bytes]]]
 Truth = dict[str, LocationTruth]
+
+
+def test_no_picture_is_made_of_a_place_where_that_would_be_worth_no_more_than_the_one_that_is_kept() -> None:
+    (seen,) = itertools.islice(shelf_pictures(SITE, CAMERA, LOOK, SEED, ("A1",)), 1)
+    places = Assigner(SITE, SIGHT).places(seen.pose, seen.view.locations)
+    full, all_kept = read_shelf(seen.picture, 0, 0, places)
+    assert len(all_kept) == len(places)
+    best = [replace(place, kept=PictureWorth(True, True, 1.0)) for place in places]
+    codes, kept = read_shelf(seen.picture, 0, 0, best)
+    assert not kept
+    assert [replace(look, evidence="") for look in full.places] == list(codes.places)
+    worse = [replace(place, kept=PictureWorth(False, False, 1.0)) for place in places]
+    assert read_shelf(seen.picture, 0, 0, worse)[1] == all_kept
 
 
 def test_empty_places_are_told_and_no_other_is_ever_called_empty(looks: Looks, truth: Truth) -> None:

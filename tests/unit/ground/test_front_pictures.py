@@ -9,6 +9,7 @@ import numpy as np
 
 from flightd.app.absent_parts import NoGround
 from flightd.app.counting.code_readers import Reading, ShelfWatch, Wanted, read_frame
+from flightd.app.counting.count import Counting
 from flightd.core.preview import CameraName, Preview
 from flightd.core.scanning import CodeSet, Occupancy, Place, PlaceLook
 from flightd.runtime.frame_ring import FrameTicket
@@ -35,6 +36,8 @@ class Asking(NoGround):
 
 class Here:
     """Reads in this process what the reader processes read."""
+
+    replaced = 0
 
     def __init__(self) -> None:
         self.wanted: list[Wanted] = []
@@ -94,6 +97,8 @@ def test_a_frame_that_is_only_scanned_is_made_no_picture_of() -> None:
 class Named:
     """Answers each frame with one place, whose picture is named after the frame."""
 
+    replaced = 0
+
     async def read(self, ticket: FrameTicket, wanted: Wanted) -> Reading | None:
         name = f"picture {ticket.seq}"
         look = PlaceLook(wanted.places[0].location, (), 1.0, Occupancy.GOODS, name)
@@ -121,3 +126,33 @@ def test_the_best_picture_of_a_place_is_kept_for_as_long_as_it_may_be_asked_for(
     assert watch.evidence("picture 7") == b"picture 7"
     assert watch.evidence("picture 1998"), "read, and not taken yet"
     assert not watch.evidence("picture 8"), "nobody asks for it any more"
+
+
+class Losing(Here):
+    """Takes its time over each frame and loses it."""
+
+    replaced = 2
+
+    async def read(self, ticket: FrameTicket, wanted: Wanted) -> Reading | None:
+        self.wanted.append(wanted)
+        await asyncio.sleep(1.0)
+        return None
+
+
+def test_frames_that_no_reader_has_time_for_or_that_are_lost_in_one_are_counted() -> None:
+    counting = Counting(Losing(), workers=1)
+    counting.read_for(lambda _: (PLACE,), tuple)
+
+    async def look() -> None:
+        (task,) = counting.tasks(lambda _: None).values()
+        running = asyncio.ensure_future(task())
+        for seq in range(6):
+            counting.frame(FrameTicket("ring", 0, 4, seq, 10**9, 10**9, 1280, 720))
+            await asyncio.sleep(0.4)
+        await asyncio.sleep(1.0)
+        running.cancel()
+        await asyncio.wait([running])
+
+    virtual(look())
+    assert counting.dropped == {"front_camera": 3, "reading": 3, "findings": 0, "pictures": 0}
+    assert counting.replaced == 2

@@ -11,7 +11,15 @@ from hypothesis import strategies as st
 
 from flightd.config.scan import ScanConfig
 from flightd.core.inventory import LocationState, PlaceFill
-from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Occupancy, PlaceLook
+from flightd.core.scanning import (
+    BodyPose,
+    CodeSet,
+    Finding,
+    Light,
+    Occupancy,
+    PictureWorth,
+    PlaceLook,
+)
 from flightd.mission.scan.code_assignment import Assigner, PlacedRead, ShelfLook
 from flightd.mission.scan.location_votes import LocationVotes
 from flightd.mission.scan.sweep_planner import SweepPlanner
@@ -66,6 +74,26 @@ def test_reads_of_several_views_are_merged() -> None:
         LocationState.READ, ["P1"], 2,
     )  # fmt: skip
     assert found.evidence in {"picture 1", "picture 3"}
+
+
+def test_a_picture_of_the_place_is_kept_until_there_is_one_that_is_worth_more() -> None:
+    votes = SweepVotes(CODE, "A2", PARAMS, 0.8)
+    assert votes.kept < PictureWorth(False, False, 0.0)
+
+    def kept(seq: int, share: float, reads: Sequence[PlacedRead], light: Light = Light.FAIR) -> PictureWorth:
+        look = PlaceLook(CODE, QUAD, share, GOODS, f"picture {seq}", light)
+        votes.add(seq, pose(seq), look, reads, bearing_rad=0.0)
+        return votes.kept
+
+    part = PictureWorth(False, True, 0.4)
+    assert kept(1, 0.4, ()) == part
+    assert kept(2, 0.6, (), Light.BURNT) == part
+    assert kept(3, 0.6, [placed("P1")]) == PictureWorth(True, True, 0.6)
+    assert kept(4, 0.8, ()) == PictureWorth(True, True, 0.6)
+    assert kept(5, 0.8, [placed("P1")]) == PictureWorth(True, True, 1.0)  # no picture of this leg shows more
+    found = votes.verdict()
+    assert isinstance(found, Finding)
+    assert found.evidence == "picture 5"
 
 
 def test_what_one_view_alone_gives_is_visited_again() -> None:

@@ -144,6 +144,14 @@ class StatusReport(msgspec.Struct, frozen=True):
             description="node of the pad on which it comes down at last; null: a daemon that takes no `lands`"
         ),
     ] = None
+    dropped: Annotated[
+        dict[str, int],
+        Meta(description="lost since the start, by where, as the metric `flightd_dropped_total`"),
+    ] = {}
+    restarts: Annotated[
+        dict[str, int],
+        Meta(description="replaced since the start, by the part, as the metric `flightd_restarts_total`"),
+    ] = {}
 
 
 class EventReport(msgspec.Struct, frozen=True):
