@@ -24,6 +24,10 @@ class Tick:
         self._call = flight.publishers.barrier.call
         self._step = GuardedStep(flight.pilot)
         self._last = LastAnswers()
+        self.dropped: dict[str, int] = {}
+        """What full queues and lost workers had cost at the newest tick, by their names."""
+        self.restarts: dict[str, int] = {}
+        """What had died and was brought back by then, by the part's name."""
         # once: to look for a protocol's members takes as long as a tick's whole status
         self._counts_drops = flight.vehicle if isinstance(flight.vehicle, CountsDrops) else None
 
@@ -31,31 +35,6 @@ class Tick:
     def output(self) -> TickOutput:
         """What the newest tick answered."""
         return self._step.output
-
-    @property
-    def dropped(self) -> dict[str, int]:
-        """What full queues and lost workers have cost since the start, by their names."""
-        flight = self._flight
-        dropped = {
-            **flight.vision.dropped,
-            "recorder": flight.recorder.dropped,
-            "refused": flight.camera.refused + flight.front_camera.refused,
-            "setpoints": flight.setpoints.failed,
-            **flight.counting.dropped,
-        }
-        if self._counts_drops is not None:
-            dropped["vehicle"] = self._counts_drops.dropped
-        return dropped
-
-    @property
-    def restarts(self) -> dict[str, int]:
-        """What has died and was brought back since the start, by the part's name."""
-        flight = self._flight
-        return {
-            "detector": flight.vision.replaced,
-            "reader": flight.counting.replaced,
-            "recorder": flight.recorder.restarts,
-        }
 
     def order(self, command: Command) -> None:
         """Hand an operator's order to the next tick."""
@@ -138,9 +117,29 @@ class Tick:
     def _possible_commands(self) -> frozenset[CommandKind]:
         return frozenset() if self._step.escaped else self._flight.pilot.possible_commands
 
+    def _count_losses(self, health: Health) -> None:
+        """Newly fill in `dropped` and `restarts`."""
+        flight = self._flight
+        dropped = {
+            **flight.vision.dropped,
+            "recorder": flight.recorder.dropped,
+            "refused": flight.camera.refused + flight.front_camera.refused,
+            "setpoints": flight.setpoints.failed,
+            **self._call("count", lambda: flight.counting.dropped, {}),
+        }
+        if self._counts_drops is not None:
+            dropped["vehicle"] = self._counts_drops.dropped
+        self.dropped = dropped
+        self.restarts = {
+            "detector": health.detectors_replaced,
+            "reader": self._call("count", lambda: flight.counting.replaced, 0),
+            "recorder": health.recorder_restarts,
+        }
+
     def _snapshot(self, tick: TickInput, output: TickOutput, late_s: float) -> Snapshot:
         flight, pilot, call = self._flight, self._flight.pilot, self._call
         vision = flight.vision
+        self._count_losses(tick.health)
         return Snapshot(
             tick,
             output,

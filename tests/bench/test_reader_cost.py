@@ -7,6 +7,7 @@ picture.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from statistics import median, quantiles
 
 import cv2
@@ -16,8 +17,7 @@ import pytest
 from flightd.core.types import Image
 from flightd.vision.shelf.code_reader import read_codes
 from flightd.vision.shelf.code_regions import CodeSearch
-from flightd.vision.shelf.shelf_look import read_shelf
-from tools.bench_reader import Shelf, cost, line, shelves, small
+from tools.bench_reader import Shelf, cost, line, shelf_cost, shelves, small
 
 
 @pytest.fixture(scope="module")
@@ -34,16 +34,13 @@ def shrunk(seen: list[Shelf]) -> list[Image]:
 
 
 def test_a_frame_with_places_in_view_costs_some_tens_of_conversions(seen: list[Shelf]) -> None:
-    found = cost(
-        [shelf.picture for shelf in seen], lambda i: read_shelf(seen[i].picture, i, i, seen[i].places)
-    )
+    found = shelf_cost(seen)
     print("\n" + line("reader, places in view", found))
     assert median(found.units) < 45
 
 
 def test_a_small_picture_of_goods_costs_no_more_than_its_first_look(shrunk: list[Image]) -> None:
-    found = cost(shrunk, lambda i: read_codes(shrunk[i]))
-    first = cost(shrunk, lambda i: read_codes(shrunk[i], deeper=False))
+    found, first = cost(shrunk), cost(shrunk, partial(read_codes, deeper=False))
     print("\n" + line("codes, 640x480", found))
     assert median(found.units) < 60
     assert quantiles(found.units, n=10)[-1] < 3 * median(first.units)
