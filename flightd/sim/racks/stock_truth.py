@@ -10,6 +10,7 @@ from typing import Any
 
 from flightd.core.inventory import LocationRecord, LocationState
 from flightd.sim.racks.appearance import RackAppearance
+from flightd.sim.racks.goods import boxes_in_rows
 from flightd.sim.racks.stock import StockPlace, StockSituation, stock
 from flightd.site.site import Site
 
@@ -31,8 +32,9 @@ class LabelTruth:
 
 @dataclass(frozen=True, slots=True)
 class LocationTruth:
-    """One location: the state that a perfect count gives it, its labels, and `fill`, the part of its
-    opening that goods stand in as seen straight from before it, 0..1."""
+    """One location: the state that a perfect count gives it, its labels, `fill`, the part of its
+    opening that goods stand in as seen straight from before it, 0..1, and `boxes`, how many are seen in each
+    row of its front, the highest first: none where there are none, or something else beside them."""
 
     code: str
     node: str
@@ -40,6 +42,7 @@ class LocationTruth:
     situation: str
     labels: tuple[LabelTruth, ...]
     fill: float = 0.0
+    boxes: tuple[int, ...] = ()
 
     @property
     def texts(self) -> frozenset[str]:
@@ -84,7 +87,7 @@ class StockScore:
 def stock_truth(site: Site, look: RackAppearance, focal_px: float, seed: int) -> dict[str, LocationTruth]:
     """The truth of every location of the site, by its code; `seed` is the flight's."""
     stock_seed = seed if look.seed is None else look.seed
-    places = stock(site, look.shares, focal_px, stock_seed, look.in_part)
+    places = stock(site, look.shares, focal_px, stock_seed, look.in_part, look.cartons)
     return {code: _truth(place) for code, place in places.items()}
 
 
@@ -101,8 +104,20 @@ def _truth(place: StockPlace) -> LocationTruth:
     location = place.opening.location
     situation = place.situation
     return LocationTruth(
-        location.code, location.node, situation.state, situation.value, labels, round(place.fill, 3)
+        location.code,
+        location.node,
+        situation.state,
+        situation.value,
+        labels,
+        round(place.fill, 3),
+        boxes_of(place),
     )
+
+
+def boxes_of(place: StockPlace) -> tuple[int, ...]:
+    """How many boxes are seen in each row of a place, the highest first."""
+    goods = place.goods
+    return boxes_in_rows(goods) if goods is not None and not goods.beside and not goods.covered else ()
 
 
 def score_stock(
@@ -167,6 +182,7 @@ def _row(place: LocationTruth) -> dict[str, Any]:
         "state": place.state.value,
         "situation": place.situation,
         "fill": place.fill,
+        "boxes": place.boxes,
         "labels": [
             {"symbology": label.symbology, "text": label.text, "condition": label.condition}
             for label in place.labels
