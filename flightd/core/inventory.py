@@ -61,15 +61,33 @@ class CountPose:
 
 
 @dataclass(frozen=True, slots=True)
+class CaseGrid:
+    """The cases of one kind in the front of a regular stack: what is seen, never what stands behind."""
+
+    columns: int
+    rows: int
+
+    def __post_init__(self) -> None:
+        if min(self.columns, self.rows) < 1:
+            raise ValueError(f"a stack of {self.columns} by {self.rows} cases")
+
+    @property
+    def count(self) -> int:
+        """The cases in the front."""
+        return self.columns * self.rows
+
+
+@dataclass(frozen=True, slots=True)
 class PlaceFill:
     """How full a place is: the `share` of its opening, 0..1 as seen straight from before it, in which goods
     stand; None where the pictures do not tell.  `overhang_m` is how far goods are seen to stand out over the
     rack's face, None where none are.  `lean_m` is how far the top of the goods that are seen to lean most is
-    aside of their foot, None where that is not known."""
+    aside of their foot, `cases` what is seen of a regular stack; None where that is not known."""
 
     share: float | None
     overhang_m: float | None = None
     lean_m: float | None = None
+    cases: CaseGrid | None = None
 
     def __post_init__(self) -> None:
         if self.share is not None and not 0.0 <= self.share <= 1.0:
