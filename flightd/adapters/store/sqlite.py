@@ -26,7 +26,7 @@ from flightd.adapters.store.label_texts import (
     merge_texts,
     was_searched,
 )
-from flightd.adapters.store.place_fills import FILL_TABLES, LEAN_COLUMN, keep_fill, kept_fills
+from flightd.adapters.store.place_fills import CASE_COLUMNS, FILL_TABLES, LEAN_COLUMN, keep_fill, kept_fills
 from flightd.adapters.store.read_only import connect_read_only
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
@@ -41,13 +41,13 @@ from flightd.core.inventory import (
 from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
-_VERSION = 5
+_VERSION = 6
 _WITH_TEXTS = 3
 """The first format with module sizes and printed text."""
 _WITH_FILLS = 4
 """The first that says how full places are."""
-_READABLE = (2, 3, 4, _VERSION)
-"""Formats that are read as they are: nothing but that, and how much goods lean, is missing."""
+_READABLE = (2, 3, 4, 5, _VERSION)
+"""Formats that are read as they are: nothing but that, how much goods lean, and cases, is missing."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
 _TAKEN_OVER = {
@@ -55,6 +55,7 @@ _TAKEN_OVER = {
     2: ("ALTER TABLE code_read ADD COLUMN module_px REAL", *TEXT_TABLES),
     3: FILL_TABLES,
     4: LEAN_COLUMN,
+    5: CASE_COLUMNS,
 }
 """What makes a file of each earlier format one of the next."""
 _SCHEMA = """
@@ -86,7 +87,7 @@ CREATE TABLE code_read (
     module_px REAL,
     PRIMARY KEY (observation, number)
 ) STRICT, WITHOUT ROWID;
-""" + "".join(f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES, *LEAN_COLUMN))
+""" + "".join(f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES, *LEAN_COLUMN, *CASE_COLUMNS))
 
 
 class SqliteStore:
@@ -349,8 +350,7 @@ class SqliteStore:
             )
             reads.setdefault(seen, []).append(read)
         texts = kept_texts(self._db) if self._version >= _WITH_TEXTS else {}
-        with_fills = self._version >= _WITH_FILLS
-        fills = kept_fills(self._db, with_lean=self._version == _VERSION) if with_fills else {}
+        fills = kept_fills(self._db) if self._version >= _WITH_FILLS else {}
         rows = self._db.execute(
             "SELECT id, run, location, utc_ns, state, confidence, evidence, "
             "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "

@@ -13,11 +13,12 @@ from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.core.csv_text import inert
 from flightd.core.inventory import LocationRecord
 from flightd.core.utc_time import utc_text
+from flightd.inventory.export.rows import FILL_COLUMNS, fill_cells
 from flightd.sim.racks.stock_truth import score_stock
 
 _COLUMNS = (
     "location", "node", "state", "texts", "symbology", "confidence", "utc", "x_m", "y_m", "height_m", "run",
-    "evidence",
+    "evidence", *FILL_COLUMNS,
 )  # fmt: skip
 
 
@@ -77,4 +78,5 @@ def _row(record: LocationRecord) -> list[str | float]:
         *(round(value, 3) if isinstance(value, float) else value for value in where),
         seen.run,
         seen.evidence,
+        *fill_cells(seen),
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from typing import Any
 
 from flightd.core.inventory import LocationRecord, Observation, PlaceFill
 from flightd.core.label_values import LEAST_CONFIDENCE, PlaceValue, told_number
@@ -57,9 +58,15 @@ def observation_json(seen: Observation, least_confidence: float = LEAST_CONFIDEN
     }
 
 
-def fill_json(fill: PlaceFill) -> dict[str, float | None]:
-    """How full a place is; null for what the pictures do not tell."""
-    return {"share": fill.share, "overhang_m": fill.overhang_m, "lean_m": fill.lean_m}
+def fill_json(fill: PlaceFill) -> dict[str, Any]:
+    """How full a place is, and the cases in its front; null for what the pictures do not tell."""
+    cases = fill.cases
+    return {
+        "share": fill.share,
+        "overhang_m": fill.overhang_m,
+        "lean_m": fill.lean_m,
+        "cases": cases and {"columns": cases.columns, "rows": cases.rows, "count": cases.count},
+    }
 
 
 def _value_json(stands: PlaceValue) -> dict[str, object]:

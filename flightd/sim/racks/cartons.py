@@ -81,7 +81,7 @@ class CartonStack:
         words = str(rng.choice(_WORDS)) if rng.random() < 0.7 else ""
         words_part = float(rng.uniform(0.05, 0.12))
         edges = np.round(np.cumsum([0.0, *self._heights()]) * shape[0]).astype(int).tolist()
-        rows = []
+        rows: list[tuple[Box, ...]] = []
         for (top, below), count in zip(itertools.pairwise(edges), self.columns_of_rows, strict=True):
             whole = count + self.missing if not rows else count
             cuts = np.round(np.linspace(0, shape[1], whole + 1)).astype(int).tolist()[: count + 1]

@@ -64,7 +64,8 @@ class StockScore:
     place).  `empty_*`: places without goods, those said to be so, and others said to be so.
     `unreadable_*`: places whose labels cannot be read (torn, too small, missing, covered), and those told
     as unreadable or occluded.  `locations_right` have exactly the state of a perfect count.  `fill_told`:
-    places of which it was told how full they are, `fill_right` of these within 10 points of the truth."""
+    places of which it was told how full they are, `fill_right` of these within 10 points of the truth;
+    `cases_told`: those of which cases were counted, `cases_right` of these as they stand in the front."""
 
     locations_planned: int
     locations_visited: int
@@ -79,6 +80,8 @@ class StockScore:
     unreadable_told: int
     fill_told: int
     fill_right: int
+    cases_told: int
+    cases_right: int
 
     def as_summary(self) -> dict[str, int]:
         return {field.name: getattr(self, field.name) for field in fields(self)}
@@ -146,11 +149,12 @@ def score_stock(
     empty = [place for place in asked if place.situation == StockSituation.EMPTY]
     unknown = [place for place in asked if place.state in _UNKNOWN]
     fills = [
-        (record.observation.fill.share, place.fill)
+        (record.observation.fill, place)
         for place in asked
         if (record := found.get(place.code)) and record.observation and record.observation.fill
     ]
-    shares = [(share, true) for share, true in fills if share is not None]
+    shares = [(fill.share, place.fill) for fill, place in fills if fill.share is not None]
+    cases = [(fill.cases, place.boxes) for fill, place in fills if fill.cases is not None]
     said_empty = [code for code, state in told.items() if state is LocationState.EMPTY]
     return StockScore(
         locations_planned=len(asked),
@@ -166,6 +170,8 @@ def score_stock(
         unreadable_told=sum(told[place.code] in _UNKNOWN for place in unknown),
         fill_told=len(shares),
         fill_right=sum(abs(share - true) <= _SAME_FILL for share, true in shares),
+        cases_told=len(cases),
+        cases_right=sum(boxes == (grid.columns,) * grid.rows for grid, boxes in cases),
     )
 
 
