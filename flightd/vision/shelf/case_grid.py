@@ -71,9 +71,12 @@ def case_grid(
     start, stop, top_m = front
     deck, wide = round(BELOW_M / ROW_M), round(COLUMN_M / ROW_M)
     x0_px = (start + left) * wide
-    blue, green, red = cv2.split(square[deck : deck + round(top_m / ROW_M), x0_px : (stop + left) * wide])
+    seen = square[deck : deck + round(top_m / ROW_M), x0_px : (stop + left) * wide]
+    if min(seen.shape[:2]) < 2 * _LEAST_WIDTH_M / ROW_M:
+        return None
+    blue, green, red = cv2.split(seen)
     level = cv2.max(cv2.max(blue, green), red).astype(np.float32) / np.float32(white)
-    if min(level.shape) < 2 * _LEAST_WIDTH_M / ROW_M or float(np.median(level)) < _LEAST_TONE:
+    if float(np.median(level)) < _LEAST_TONE:
         return None
     hidden = np.zeros(level.shape, np.bool_)
     for x0_m, low_m, x1_m, high_m in codes_m:

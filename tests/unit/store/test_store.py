@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import LocationState, Observation, PlaceFill, PlannedLocation
+from flightd.core.inventory import CaseGrid, LocationState, Observation, PlaceFill, PlannedLocation
 from flightd.core.types import CodeRead
 from flightd.ports import Store
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
@@ -53,7 +53,16 @@ def test_what_was_committed_is_read_back_as_it_was(tmp_path: Path) -> None:
         assert [observation.id for observation in store.history("A-02")] == [seen.id]
 
 
-@pytest.mark.parametrize("fill", [PlaceFill(0.625, 0.04, 0.03), PlaceFill(0.0), PlaceFill(None), None])
+@pytest.mark.parametrize(
+    "fill",
+    [
+        PlaceFill(0.625, 0.04, 0.03, CaseGrid(4, 3)),
+        PlaceFill(None, cases=CaseGrid(2, 2)),
+        PlaceFill(0.0),
+        PlaceFill(None),
+        None,
+    ],
+)
 def test_how_full_a_place_is_is_read_back_as_it_was_and_merged(
     tmp_path: Path, fill: PlaceFill | None
 ) -> None:
@@ -246,10 +255,11 @@ def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path:
         assert [kept.id for kept in other.history(seen.location)] == [seen.id]
 
 
-TO_4 = ("ALTER TABLE place_fill DROP COLUMN lean_m",)
+TO_5 = tuple(f"ALTER TABLE place_fill DROP COLUMN {name}" for name in ("case_columns", "case_rows"))
+TO_4 = (*TO_5, "ALTER TABLE place_fill DROP COLUMN lean_m")
 TO_3 = ("DROP TABLE place_fill",)
 TO_2 = (*TO_3, "ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
-OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2, 3: TO_3, 4: TO_4}
+OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2, 3: TO_3, 4: TO_4, 5: TO_5}
 
 
 @pytest.mark.parametrize("version", OLDER)
