@@ -43,10 +43,16 @@ class Standing(enum.IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class PlannedLocation:
-    """A place that must be counted, and the node of the map it is counted from."""
+    """A place that must be counted, and the node of the map it is counted from; so many pallets stand behind
+    one another in it."""
 
     code: str
     node: str
+    pallets_deep: int = 1
+
+    def __post_init__(self) -> None:
+        if self.pallets_deep < 1:
+            raise ValueError(f"{self.code}: {self.pallets_deep} pallets deep")
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,15 +156,22 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class LocationRecord:
-    """A location as it stands: by its newest observation, None while nobody looked."""
+    """A location as it stands: by its newest observation, None while nobody looked.  Of `pallets_deep`
+    pallets behind one another what stands in front is counted, never what is behind."""
 
     code: str
     node: str
     observation: Observation | None
+    pallets_deep: int = 1
 
     @property
     def state(self) -> LocationState:
         return self.observation.state if self.observation else LocationState.NOT_VISITED
+
+    @property
+    def pallets_seen(self) -> int:
+        """Of the pallets behind one another, how many the look shows: the first, or none."""
+        return int(self.state not in {LocationState.NOT_VISITED, LocationState.OCCLUDED})
 
     @property
     def texts(self) -> tuple[str, ...]:

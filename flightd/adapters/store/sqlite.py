@@ -47,7 +47,7 @@ _WITH_TEXTS = 3
 _WITH_FILLS = 4
 """The first that says how full places are."""
 _READABLE = (2, 3, 4, 5, _VERSION)
-"""Formats that are read as they are: nothing but that, how much goods lean, and cases, is missing."""
+"""Formats that are read as they are: what they lack is not known, and places are one pallet deep."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
 _TAKEN_OVER = {
@@ -55,13 +55,14 @@ _TAKEN_OVER = {
     2: ("ALTER TABLE code_read ADD COLUMN module_px REAL", *TEXT_TABLES),
     3: FILL_TABLES,
     4: LEAN_COLUMN,
-    5: CASE_COLUMNS,
+    5: (*CASE_COLUMNS, "ALTER TABLE location ADD COLUMN pallets_deep INTEGER NOT NULL DEFAULT 1"),
 }
 """What makes a file of each earlier format one of the next."""
 _SCHEMA = """
 CREATE TABLE location (
     code TEXT PRIMARY KEY,
-    node TEXT NOT NULL
+    node TEXT NOT NULL,
+    pallets_deep INTEGER NOT NULL DEFAULT 1
 ) STRICT, WITHOUT ROWID;
 CREATE TABLE observation (
     id TEXT PRIMARY KEY,
@@ -218,11 +219,12 @@ class SqliteStore:
                 raise InputError(f"{self._file}: no inventory, or a damaged one: {err}") from err
 
     def plan(self, locations: Iterable[PlannedLocation]) -> None:
-        """Make locations known; the node of a known one follows the newest plan."""
-        rows = [(location.code, location.node) for location in locations]
+        """Make locations known; node and depth of a known one follow the newest plan."""
+        rows = [(location.code, location.node, location.pallets_deep) for location in locations]
         with self._transaction():
             self._db.executemany(
-                "INSERT INTO location VALUES (?, ?) ON CONFLICT (code) DO UPDATE SET node = excluded.node",
+                "INSERT INTO location VALUES (?, ?, ?) ON CONFLICT (code)"
+                " DO UPDATE SET node = excluded.node, pallets_deep = excluded.pallets_deep",
                 rows,
             )
 
@@ -275,7 +277,7 @@ class SqliteStore:
     def _insert(self, seen: Observation, standing: int) -> None:
         pose = seen.pose
         node = pose.node if pose else ""
-        self._db.execute("INSERT OR IGNORE INTO location VALUES (?, ?)", (seen.location, node))
+        self._db.execute("INSERT OR IGNORE INTO location (code, node) VALUES (?, ?)", (seen.location, node))
         where = (pose.node, pose.x_m, pose.y_m, pose.height_m, pose.yaw_rad) if pose else (None,) * 5
         cursor = self._db.execute(
             "INSERT OR IGNORE INTO observation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -324,8 +326,9 @@ class SqliteStore:
         with self._reading():
             looks = self._observations()
             newest = {seen.location: seen for seen, standing in looks if standing == Standing.CONFIRMED}
-            rows = self._db.execute("SELECT code, node FROM location ORDER BY code").fetchall()
-        return [LocationRecord(code, node, newest.get(code)) for code, node in rows]
+            deep = "pallets_deep" if self._version == _VERSION else "1"
+            rows = self._db.execute(f"SELECT code, node, {deep} FROM location ORDER BY code").fetchall()  # noqa: S608
+        return [LocationRecord(code, node, newest.get(code), depth) for code, node, depth in rows]
 
     def history(self, location: str) -> list[Observation]:
         """Every look at one location, oldest first, pending and withdrawn ones too."""
@@ -370,7 +373,9 @@ class SqliteStore:
     def merge(self, other: SqliteStore) -> int:
         """Take in everything of another store, pictures included; returns how many looks were new."""
         with other._reading():
-            planned = [PlannedLocation(record.code, record.node) for record in other.locations()]
+            planned = [
+                PlannedLocation(record.code, record.node, record.pallets_deep) for record in other.locations()
+            ]
             seen = other._observations()
             searched = all_searches(other._db) if other._version >= _WITH_TEXTS else []
         for observation, _ in seen:
@@ -378,8 +383,8 @@ class SqliteStore:
                 self.evidence.keep(other.evidence.path(observation.evidence).read_bytes())
         with self._transaction():
             before = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
-            rows = [(location.code, location.node) for location in planned]
-            self._db.executemany("INSERT OR IGNORE INTO location VALUES (?, ?)", rows)
+            rows = [(location.code, location.node, location.pallets_deep) for location in planned]
+            self._db.executemany("INSERT OR IGNORE INTO location VALUES (?, ?, ?)", rows)
             for observation, standing in seen:
                 self._insert(observation, standing)
             merge_texts(self._db, searched)

@@ -39,12 +39,13 @@ def _known(record: LocationRecord, least_confidence: float) -> Iterator[str]:
     for stands in place_values(seen, least_confidence):
         if stands.kind in _SHOWN and stands.known is not None:
             yield f"{stands.kind} {visible(stands.known.text)}"
-    if seen is None or seen.fill is None:
-        return
-    if seen.fill.share is not None and record.state is not LocationState.EMPTY:
-        yield f"fill {100.0 * seen.fill.share:.0f} %"
-    if cases := seen.fill.cases:
+    fill = seen.fill if seen else None
+    if fill and fill.share is not None and record.state is not LocationState.EMPTY:
+        yield f"fill {100.0 * fill.share:.0f} %"
+    if fill and (cases := fill.cases):
         yield f"cases {cases.columns} x {cases.rows}"
+    if record.pallets_deep > 1:
+        yield f"{record.pallets_seen} of {record.pallets_deep} pallets seen"
 
 
 def states_line(records: Sequence[LocationRecord]) -> str:

@@ -19,6 +19,8 @@ def location_json(record: LocationRecord, least_confidence: float = LEAST_CONFID
         "location": record.code,
         "state": record.state.value,
         "node": record.node,
+        "pallets_deep": record.pallets_deep,
+        "pallets_seen": record.pallets_seen,
         "texts": list(record.texts),
         "values": [_value_json(value) for value in place_values(seen, least_confidence)],
         "observation": observation_json(seen, least_confidence) if seen else None,

@@ -13,9 +13,10 @@ from flightd.inventory.export.value_columns import UNKNOWN, VALUE_COLUMNS, value
 from flightd.inventory.place_values import code_values, place_values
 
 FILL_COLUMNS: Final = ("fill", "overhang_m", "lean_m", "cases", "case_columns", "case_rows")
+DEPTH_COLUMNS: Final = ("pallets_deep", "pallets_seen")
 COLUMNS: Final = (
     "location", "state", "text", "symbology", "gs1", "confidence", "utc", "run", "node", "x_m", "y_m",
-    "height_m", "evidence", *VALUE_COLUMNS, *FILL_COLUMNS,
+    "height_m", "evidence", *VALUE_COLUMNS, *FILL_COLUMNS, *DEPTH_COLUMNS,
 )  # fmt: skip
 
 
@@ -43,7 +44,8 @@ def rows_of(
                     seen.confidence if seen else "", utc_text(seen.utc_ns) if seen else "",
                     seen.run if seen else "", record.node, pose.x_m if pose else "",
                     pose.y_m if pose else "", pose.height_m if pose else "", seen.evidence if seen else "",
-                    *value_cells(values), *fill_cells(seen),
+                    *value_cells(values), *fill_cells(seen), record.pallets_deep,
+                    record.pallets_seen,
                 ]
             )  # fmt: skip
     return rows

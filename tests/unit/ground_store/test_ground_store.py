@@ -72,11 +72,14 @@ def test_what_was_taken_is_there_when_it_is_opened_again(
 ) -> None:
     evidence = FolderEvidence(tmp_path / "evidence")
     with GroundStore(engine(), evidence) as first:
-        first.take(batch(look("A-1", "PAL-1"), places=(PlannedLocation("A-2", "A7"),)))
+        first.take(batch(look("A-1", "PAL-1"), places=(PlannedLocation("A-2", "A7", 2),)))
     with GroundStore(engine(), evidence) as second:
         assert second.id == first.id
         assert places_of(second) == {"A-1": ("read", ["PAL-1"], "monday"), "A-2": ("not_visited", [], None)}
         assert second.stock(SITE)[1]["node"] == "A7"
+        assert [row["pallets_deep"] for row in second.stock(SITE)] == [1, 2]
+        second.take(batch(places=(PlannedLocation("A-2", "A7", 3),)))
+        assert second.stock(SITE)[1]["pallets_deep"] == 3
 
 
 def test_a_look_comes_back_as_it_was_seen(store: GroundStore) -> None:
@@ -328,7 +331,9 @@ def test_a_store_from_before_places_told_how_full_they_are_is_taken_over(
         session.run("INSERT INTO place (site, code, node, state) VALUES (1, ?, ?, ?)", "A-1", "A1", "empty")
     older.close()
     with GroundStore(engine(), FolderEvidence(tmp_path / "evidence")) as store:
-        assert [(row["state"], row["fill"]) for row in store.stock(SITE)] == [("empty", None)]
+        assert [(row["state"], row["fill"], row["pallets_deep"]) for row in store.stock(SITE)] == [
+            ("empty", None, 1)
+        ]
         store.take(batch(look("A-1", "PAL-1", fill=PlaceFill(0.5))))
         assert store.stock(SITE)[0]["fill"] == {
             "share": 0.5,

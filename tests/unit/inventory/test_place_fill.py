@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -72,3 +73,11 @@ def test_cases_are_said_as_what_is_seen_of_the_front() -> None:
     assert cases_text(cases) == "12 (4 by 3) in the front"
     assert "cases: 12 (4 by 3) in the front" in cell(record(cases), "")
     assert (cases_text(PlaceFill(0.5)), cases_text(None)) == ("", "")
+
+
+def test_exports_say_that_of_several_pallets_the_first_alone_is_seen() -> None:
+    seen, unseen = replace(record(None), pallets_deep=3), LocationRecord("A-2", "A1", None, 3)
+    rows = csv.DictReader(io.StringIO(as_csv([seen, unseen]).decode()))
+    assert [(row["pallets_deep"], row["pallets_seen"]) for row in rows] == [("3", "1"), ("3", "0")]
+    places = json.loads(as_json([seen, unseen]))["locations"]
+    assert [(place["pallets_deep"], place["pallets_seen"]) for place in places] == [(3, 1), (3, 0)]

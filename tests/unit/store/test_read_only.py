@@ -75,6 +75,7 @@ def test_a_store_of_a_format_before_is_read_as_it_is(tmp_path: Path, version: in
     with SqliteStore(tmp_path) as writer:
         writer.commit(seen)
     with sqlite3.connect(tmp_path / "inventory.db") as older:
+        older.execute("ALTER TABLE location DROP COLUMN pallets_deep")
         for column in ("case_columns", "case_rows", "lean_m")[: 2 if version == 5 else 3]:
             older.execute(f"ALTER TABLE place_fill DROP COLUMN {column}")
         if version < 4:
