@@ -54,7 +54,7 @@ _POST_OFF_M: Final = 0.06
 """So far off may be where the front ends, and where an upright may hide its end."""
 _PALLET_M: Final = (0.07, 0.17)
 """Heights at which the load on a pallet begins."""
-_LABEL_M: Final = 0.03
+_LABEL_M: Final = 0.02
 """A label's paper around its code."""
 
 
@@ -188,8 +188,8 @@ def _columns(drop: Floats, hidden: Mask, rows: Sequence[tuple[int, int]]) -> int
     spread = np.asarray(cv2.dilate(np.nan_to_num(known, nan=1.0), near), np.float32)
     seen = np.isfinite(known).sum(axis=0) >= _LEAST_ROWS
     joints = [at for at in _peaks(spread.min(axis=0) * seen, _THROUGH) if margin <= at < width - margin]
-    if not joints:
-        return None
+    if not joints or not np.isfinite(known[:, joints]).any(axis=1).all():
+        return None  # a row of which labels hide every joint may have others
     reach = round(_APART_M / ROW_M)
     rest = np.nan_to_num(known).max(axis=0)
     rest[:margin] = rest[width - margin :] = 0.0

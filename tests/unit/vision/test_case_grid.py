@@ -122,10 +122,18 @@ def test_ribs_of_crates_are_no_joints() -> None:
 
 def test_a_joint_under_a_label_is_taken_from_the_other_rows() -> None:
     raster = Front((3, 3, 3)).raster()
-    low, high, left, right = 101, 136, 60, 100
+    low, high, left, right = 136, 176, 60, 100
     raster[low:high, left:right] = PAPER
     code = (left * ROW_M + 0.01, low * ROW_M - BELOW_M, right * ROW_M - 0.01, high * ROW_M - BELOW_M)
     assert counted(raster, [code]) == CaseGrid(3, 3)
+
+
+def test_a_row_of_which_a_label_hides_every_joint_is_not_taken_to_be_like_the_others() -> None:
+    raster = Front((2, 3, 2)).raster()
+    low, high, left, right = 136, 176, 60, 180
+    raster[low:high, left:right] = PAPER
+    code = (left * ROW_M + 0.01, low * ROW_M - BELOW_M, right * ROW_M - 0.01, high * ROW_M - BELOW_M)
+    assert counted(raster, [code]) is None
 
 
 def test_one_more_joint_that_is_hardly_seen_leaves_it_untold() -> None:
