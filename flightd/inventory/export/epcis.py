@@ -43,8 +43,8 @@ def as_epcis(
     An event of an empty, unreadable or occluded location has no object: it tells the state as a sensor
     report of the read point (`location_state`), which is the standard's event of a place alone.  One that
     nobody looked at has none.  What is known of the goods and of the place besides is told by sensor reports,
-    too (`value_reports`): the standard has ILMD only in events that add an object.  The creation date is that of
-    the newest look: the same inventory gives the same document.  InputError for a `gln` that is none, or a
+    too (`value_reports`): the standard has ILMD only in events that add an object.  The creation date is that
+    of the newest look: the same inventory gives the same document.  InputError for a `gln` that is none, or a
     location code that cannot extend it.
     """
     looked = [(record, record.observation) for record in records if record.observation]
