@@ -124,6 +124,10 @@ class Pilot:
         pose = self._estimator.poses.at(stamp_ns)
         return self._scanner.places(pose) if pose is not None else ()
 
+    def evidence(self) -> frozenset[str]:
+        """The pictures, of those that it was given, that a finding may still name.  Changes nothing."""
+        return self._scanner.evidence
+
     def step(self, tick: TickInput) -> TickOutput:
         """Fly one tick.  Raises nothing: what goes wrong levels the drone at this tick and lands it from the
         next one, by the lines as long as that works, else by its autopilot."""

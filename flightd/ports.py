@@ -215,6 +215,10 @@ class Store(Protocol):
         """Confirm or withdraw what is pending of a run (committed unconfirmed) at these locations."""
         ...
 
+    def contradict(self, run: str, locations: Iterable[str]) -> None:
+        """Withdraw every look of a run at these locations, confirmed ones, too."""
+        ...
+
     def withdraw_pending(self, run: str) -> None:
         """Withdraw all that is pending of a run: the flights that saw it are over."""
         ...

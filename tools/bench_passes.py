@@ -185,7 +185,7 @@ def passes(site: Site, flight: Flight, seed: int) -> Iterator[Passed]:
     nodes = list(site.nodes)
     legs = scanner.legs(nodes, nodes[0], math.pi / 2, 1.4)
     leg = next(leg for leg in legs if leg.locations[0] in flight.boxes)
-    told = scanner.told_sweeps(nodes, [_LEVEL])[0]
+    told = scanner.told_sweeps([nodes], [_LEVEL])[0]
     found = {finding.location: finding for finding in _fly_past(site, leg, scanner, flight, seed)}
     for code, box in flight.boxes.items():
         finding = found.get(code)

@@ -17,11 +17,12 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from flightd.core.inventory import LocationState, Observation, Standing
+from flightd.core.inventory import LocationState, Observation, PlaceFill, Standing
 from flightd.core.types import CodeRead
 from flightd.ground.ground_store.batch import MOST_LOOKS, Batch, SentLook
 from flightd.ground.ground_store.engine import Engine, Session
 from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.fill_text import fill_text
 from flightd.ground.ground_store.pages import Mark
 from flightd.ground.ground_store.postgres_engine import PostgresEngine, PostgresSession
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
@@ -36,7 +37,13 @@ _LOOK_NS = 1_400_000_000
 _CHANGES_EACH = 50
 _LABEL = """'[["Code 128","' || text || '",1,2,1.0,[["00","' || text || '"]]]]'"""
 _READS = f"CASE WHEN text = '' THEN '[]' ELSE {_LABEL} END"
-_STANDS = ("utc_ns", "run", "state", "confidence")
+_NOTHING, _GOODS = fill_text(PlaceFill(0.0)), fill_text(PlaceFill(0.62, None, 0.02))
+_FILL = f"CASE WHEN text = '' THEN '{_NOTHING}' ELSE '{_GOODS}' END"
+_COLUMNS = (
+    "id, utc_ns, place, run, state, confidence, standing, node, x_m, y_m, height_m, yaw_rad, evidence, reads,"
+    " fill"
+)
+_STANDS = ("utc_ns", "run", "state", "confidence", "fill")
 _DELIVERED = 20
 """Batches."""
 
@@ -50,20 +57,25 @@ def main() -> None:
     told = arguments.parse_args()
     is_url = "://" in told.store
     engine: Engine = PostgresEngine(told.store) if is_url else SqliteEngine(Path(told.store))
+    print(json.dumps(measured(engine, told.looks, told.asked), indent=1))
+
+
+def measured(engine: Engine, looks: int, times: int) -> dict[str, object]:
+    """Load a new store, ask each question so many times, and deliver; SystemExit for a store that is not
+    empty."""
     with GroundStore(engine, FolderEvidence(Path("unused"))) as store:
         if store.counts()["sites"]:
             raise SystemExit("this store is not empty: give a new one")
         began_s = time.perf_counter()
-        runs = Bulk(engine).load(told.looks)
-        document = {
+        runs = Bulk(engine).load(looks)
+        return {
             "engine": engine.kind,
             "looks": store.counts()["looks"],
             "runs": runs,
             "loaded_s": round(time.perf_counter() - began_s, 1),
-            "ms": {name: asked(engine, ask, told.asked) for name, ask in questions(store, runs).items()},
+            "ms": {name: asked(engine, ask, times) for name, ask in questions(store, runs).items()},
             "delivered": delivered(engine, store, runs + 1),
         }
-    print(json.dumps(document, indent=1))
 
 
 def code_of(place: int) -> str:
@@ -136,8 +148,9 @@ class Bulk:
         session.run(f"UPDATE lies SET text = {texts} WHERE {changes}")  # noqa: S608
         time_ns = f"{began_ns} + place * {_LOOK_NS}"
         session.run(
-            f"INSERT INTO observation SELECT {self._id}, {time_ns}, place, {run}, {_state('text')}, 0.95, 1,"  # noqa: S608
-            f" 'A1', 0.1, 0.2, 1.5, 0.0, NULL, {_READS} FROM lies"
+            f"INSERT INTO observation ({_COLUMNS})"  # noqa: S608
+            f" SELECT {self._id}, {time_ns}, place, {run}, {_state('text')}, 0.95, 1,"
+            f" 'A1', 0.1, 0.2, 1.5, 0.0, NULL, {_READS}, {_FILL} FROM lies"
         )
         if run > 1:
             session.run(

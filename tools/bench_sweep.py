@@ -93,7 +93,8 @@ def told(site: Path) -> list[str]:
     front = {"url": "udp://127.0.0.1:0"}
     config = load_config(CONFIG).with_values(front_camera=front, scan={"mode": "sweep"})
     where = load_site(site)
-    return [sweep.text for sweep in scanner_of(config, where).told_sweeps(where.nodes)]
+    runs = [[node.id for node in where.aisle_nodes(aisle.id)] for aisle in where.aisles]
+    return [sweep.text for sweep in scanner_of(config, where).told_sweeps(runs)]
 
 
 def main() -> None:

@@ -136,7 +136,7 @@ def build(
     camera = connect(config.camera, on_frame=down_frames.put, url=peers.camera)
     front_camera: Camera = NO_CAMERA
     if counting is not None:
-        counting.read_for(pilot.places)
+        counting.read_for(pilot.places, pilot.evidence)
         counting.show_on(ground)
         front_camera = connect(config.front_camera, on_frame=counting.frame, url=peers.front_camera)
     return assemble(

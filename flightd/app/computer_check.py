@@ -11,6 +11,7 @@ from flightd.config.schema import Config
 from flightd.core.refusal import Refusal
 from flightd.doctor.calibration import check_calibration
 from flightd.doctor.check import Check, CheckLevel, FailedChecks
+from flightd.doctor.labels import check_labels
 from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.site.site import Site
 
@@ -35,7 +36,11 @@ def look_at_machine(config: Config) -> list[Check]:
 
 def look_here(config: Config, site: Site) -> list[Check]:
     """All that can be looked at without moving or asking anything.  Blocks for the disk."""
-    return [*look_at_machine(config), *check_calibration(config.camera, site, config.mission.height_m)]
+    return [
+        *look_at_machine(config),
+        *check_calibration(config.camera, site, config.mission.height_m),
+        *check_labels(config, site),
+    ]
 
 
 class ComputerCheck:

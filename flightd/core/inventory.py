@@ -38,7 +38,7 @@ class Standing(enum.IntEnum):
     """The place that it was seen at is not proven yet."""
     CONFIRMED = 1
     WITHDRAWN = 2
-    """Where the drone was, was contradicted: it may have been another place."""
+    """Where the drone was, was contradicted: it may have been another place; or what it saw, elsewhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,8 @@ class Observation:
     `evidence` is the SHA-256 of the picture, in hexadecimal, or empty.  Where in the picture a code was is no
     part of the record: reads that come from a store have no `corners_px` and no `gs1_problem`.  `texts` are
     values of printed text in the picture: they may be looked for later, and do not change the `id`, nor does
-    `fill`, which is None where it was not asked.
+    `fill`, which is None where it was not asked, nor `again`: its flight had seen the location before, and
+    that had decided nothing.
     """
 
     run: str
@@ -124,6 +125,7 @@ class Observation:
     evidence: str = ""
     texts: tuple[LabelValue, ...] = ()
     fill: PlaceFill | None = None
+    again: bool = False
 
     def __post_init__(self) -> None:
         texts = {read.text for read in self.reads}

@@ -17,7 +17,7 @@ class PlannedFlight:
     turns, from pad to pad, `way_m` how long that is.
     `seconds` in the air need `batteries`, full ones but for the first, of which `charge` is left; a battery
     is taken to last `battery_s` in the air down to its reserve.  `sweeps` is what is flown past, empty where
-    shelves are counted by stopping."""
+    shelves are counted by stopping; `unread` is what of `places` has labels too small to read."""
 
     nodes: tuple[str, ...]
     levels: tuple[int, ...]
@@ -29,6 +29,21 @@ class PlannedFlight:
     charge: float
     battery_s: float
     sweeps: tuple[PlannedSweep, ...] = ()
+    unread: UnreadLabels | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class UnreadLabels:
+    """The labels of so many `places` are not surely read, or not at all, from as near as a stop looks from.
+
+    Their modules are `px_per_module` wide in the picture from the aisle's line, at the worst place; they are
+    read `within_m`.  `what` and `remedy` say so."""
+
+    places: int
+    px_per_module: float
+    within_m: float
+    what: str
+    remedy: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +53,9 @@ class PlannedSweep:
     Flown at `height_m`, `distance_m` from the shelf, at `speed_mps`, which `limit` keeps from being more;
     `limits_mps` is what each limit alone allows.  `exposure` is a part of the front camera's usual one,
     `views` how many whole views each place gets of the `fps` frames read in a second, `needed_fps` how many
-    that speed needs.  Not `swept`: its labels are too small in the picture, it is counted by stopping.
-    `text` says so in a line."""
+    that speed needs.  Not `swept`: it is counted by stopping, and `stops_for` is why: `labels` too small in
+    the picture, a place's `width` more than that, a `line` that is not open and clear both ways, too few
+    `nodes`.  `text` says so in a line."""
 
     aisles: tuple[str, ...]
     levels: tuple[int, ...]
@@ -56,6 +72,7 @@ class PlannedSweep:
     fps: float
     needed_fps: float
     swept: bool
+    stops_for: str
     text: str
 
 

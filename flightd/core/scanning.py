@@ -122,7 +122,8 @@ class BodyPose:
 class Finding:
     """The mission's verdict on one location, from where it was seen, at the flight clock's time.
 
-    Its place is not proven before the location is named in `Settled`: until then it is pending."""
+    Its place is not proven before the location is named in `Settled`: until then it is pending.  `again`: the
+    flight had flown past the location before, or counted it, and that decided nothing."""
 
     stamp_ns: int
     location: str
@@ -136,6 +137,7 @@ class Finding:
     height_m: float
     yaw_rad: float
     fill: PlaceFill | None = None
+    again: bool = False
 
     def __post_init__(self) -> None:
         if not all(map(math.isfinite, (self.x_m, self.y_m, self.height_m, self.yaw_rad))):
@@ -144,7 +146,14 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """Locations whose pending findings are proven to be theirs, or withdrawn because they may not be."""
+    """Locations whose pending findings are proven to be theirs, or withdrawn because they may not be.
+
+    `booked`: what this count has proven of them before is withdrawn, too, for something contradicts it."""
 
     locations: tuple[str, ...]
     confirmed: bool
+    booked: bool = False
+
+    def __post_init__(self) -> None:
+        if self.confirmed and self.booked:
+            raise ValueError(f"{', '.join(self.locations)}: proven and contradicted at once")

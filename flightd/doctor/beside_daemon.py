@@ -12,6 +12,7 @@ from flightd.core.types import VehicleState
 from flightd.doctor.calibration import check_calibration, check_learnt
 from flightd.doctor.check import Check, CheckLevel, error, ok, unseen, warning
 from flightd.doctor.exposure import Seen, check_exposure, check_front_exposure
+from flightd.doctor.labels import check_labels
 from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.doctor.pose import check_pose
 from flightd.site.site import Site
@@ -47,6 +48,7 @@ def check_here(config: Config, site: Site) -> list[Check]:
         *check_processor(config.vision.workers),
         *check_calibration(config.camera, site, config.mission.height_m),
         *check_learnt(config),
+        *check_labels(config, site),
     ]
 
 

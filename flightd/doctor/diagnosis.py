@@ -19,6 +19,8 @@ from flightd.doctor.check import Check, CheckLevel, ok, warning
 from flightd.doctor.delay import check_delay
 from flightd.doctor.exposure import Seen, check_exposure
 from flightd.doctor.ground import GroundListener, check_ground
+from flightd.doctor.label_text import check_text
+from flightd.doctor.labels import check_labels
 from flightd.doctor.lamp import check_lamp
 from flightd.doctor.vehicle import Autopilot
 from flightd.ports import Clock
@@ -141,6 +143,8 @@ def _check_machine(subject: Subject) -> list[Check]:
         machine.check_disk(config.recorder),
         *machine.check_processor(config.vision.workers),
         *check_lamp(config),
+        *check_labels(config, site),
+        *check_text(config),
     ]
 
 

@@ -6,15 +6,15 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
-from flightd.config.battery import BatteryConfig
 from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.core.planned_flight import MOST_NODES, PlannedFlight
 from flightd.mission.battery.outings import Supply, WaysOfPlan, flown_on
 from flightd.mission.battery.sorties import Sorties
-from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, make_plan, runs_of
 from flightd.mission.plan.leg_times import Legs, Pace
 from flightd.mission.plan.route_optimiser import ordered_best
+from flightd.mission.scan.legibility import unread_labels
 from flightd.mission.scan.no_scan import AnyScanner
 from flightd.site.site import Site
 
@@ -34,7 +34,7 @@ class ChosenPlans:
         self._policy = policy
         self._pace = Pace.of(config.mission)
         self._legs = Legs(site, policy, self._pace)
-        self._battery: BatteryConfig = config.battery
+        self._config = config
         self._scanner = scanner
 
     def begin_at(self, node: str, yaw_rad: float) -> None:
@@ -89,22 +89,28 @@ class ChosenPlans:
         way, site = [plan.start, *(stop.node for stop in plan.stops)], self._site
         metres = sum(site.length_m(site.path(a, b)) for a, b in itertools.pairwise(way))
         ways_s = WaysOfPlan.of(site, plan, self._pace)
-        flown = flown_on(sorties, plan, ways_s, Supply(charge, rate_per_s, self._battery.reserve))
+        places = [
+            code for node in dict.fromkeys(nodes) for code in sorted(self._scanner.places_at(node, levels))
+        ]
+        flown = flown_on(sorties, plan, ways_s, Supply(charge, rate_per_s, self._config.battery.reserve))
         return PlannedFlight(
             nodes=nodes,
             levels=tuple(levels),
             way=tuple(way),
-            places=sum(len(self._scanner.places_at(node, levels)) for node in dict.fromkeys(nodes)),
+            places=len(places),
             way_m=metres,
             seconds=flown.seconds,
             batteries=flown.batteries,
             charge=charge,
-            battery_s=(1.0 - self._battery.reserve) / rate_per_s,
-            sweeps=() if by_stopping else self._scanner.told_sweeps(dict.fromkeys(nodes), levels),
+            battery_s=(1.0 - self._config.battery.reserve) / rate_per_s,
+            sweeps=() if by_stopping else self._scanner.told_sweeps(runs_of(site, plan.stops), levels),
+            unread=unread_labels(site, self._config, places),
         )
 
     def _sorties(self, levels: Sequence[int], *, by_stopping: bool) -> Sorties:
-        return Sorties(self._site, self._legs, self._battery, self._scanner, levels, by_stopping=by_stopping)
+        return Sorties(
+            self._site, self._legs, self._config.battery, self._scanner, levels, by_stopping=by_stopping
+        )
 
     def _check(self, nodes: Sequence[str], levels: Sequence[int]) -> None:
         if not nodes:

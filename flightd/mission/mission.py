@@ -442,6 +442,7 @@ class Mission:
         """To the next stop, which is the way back where the battery does not reach another one."""
         if not self.state.returning:
             self._lead_sweep(s.now_ns)
+            self._count_again(s.now_ns)
             self._turn_back(self._charging.look_ahead(s.now_ns))
         self._route.advance(s.pose, either_side=self._scan.is_scanned(self.goal))
 
@@ -453,9 +454,21 @@ class Mission:
             self._scan.end_sweep(now_ns)
             self._route.visit_undecided(now_ns)
 
+    def _count_again(self, now_ns: int) -> None:
+        """Nodes whose count was taken back are visited again, or left for the next battery."""
+        if self._scan.sweeping:
+            return
+        due = self._scan.take_due()
+        if self.state.returning:
+            self._route.recount(now_ns, due, returning=True)
+        else:
+            self._route.recount_next(now_ns, due)
+
     def _pass_by(self, s: MissionInputs) -> None:
         """What is flown past is decided, and its nodes are visited."""
         self._scan.step(s, self.goal)
+        if self.state.returning:
+            self._count_again(s.now_ns)
         known = s.localised and s.is_sure(self._params)
         if self.phase is Phase.FOLLOW and known and s.pose is not None and not self.state.returning:
             self._route.note_passed(s.now_ns, s.pose)

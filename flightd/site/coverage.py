@@ -7,15 +7,27 @@ A label is read at 2.5 pixels for each module and more, and blurred by less than
 
 from __future__ import annotations
 
+import enum
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
+from flightd.config.front_camera import FrontCameraConfig
 from flightd.site.site import Location, Shelf, Site
 
 MIN_PX_PER_MODULE = 2.5
+LEAST_PX_PER_MODULE = 1.0
+"""Below, nothing is read; from there on linear codes mostly are, others not before about 2."""
 MAX_BLUR_MODULES = 0.75
-_SLACK_M = 1e-6
+_SLACK_M = _SLACK_PX = 1e-6
+
+
+class Legibility(enum.StrEnum):
+    """Whether labels are read by their size in the picture."""
+
+    SURE = "sure"
+    UNSURE = "unsure"
+    NONE = "none"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +38,12 @@ class FrontView:
     width_px: int
     exposure_s: float
     module_m: float
+
+    @classmethod
+    def of(cls, front: FrontCameraConfig, module_m: float) -> Self:
+        """As configured."""
+        fov_rad = 2.0 * math.atan(front.width_px / 2.0 / front.fx_px)
+        return cls(fov_rad, front.width_px, front.exposure_s, module_m)
 
     @property
     def focal_px(self) -> float:
@@ -38,6 +56,13 @@ class FrontView:
 
     def px_per_module(self, distance_m: float) -> float:
         return self.focal_px * self.module_m / distance_m
+
+    def legibility(self, distance_m: float) -> Legibility:
+        """Of labels on a shelf at that distance."""
+        px = self.px_per_module(distance_m)
+        if px >= MIN_PX_PER_MODULE - _SLACK_PX:
+            return Legibility.SURE
+        return Legibility.UNSURE if px >= LEAST_PX_PER_MODULE else Legibility.NONE
 
     def speed_limit_mps(self) -> float:
         """Fastest flight along the shelf at which the blur stays within 0.75 module."""
@@ -110,11 +135,7 @@ def check_coverage(site: Site, view: FrontView, speed_mps: float) -> Coverage:
     if not site.locations and site.shelves:
         smallest = min(view.px_per_module(_shelf_distance_m(site, shelf)) for shelf in site.shelves)
     if smallest < MIN_PX_PER_MODULE:
-        far = view.reading_distance_m()
-        problems.append(
-            f"labels get {smallest:.2f} px per module, {MIN_PX_PER_MODULE:g} are needed: "
-            f"come within {far:.2f} m, or take a longer lens or larger labels"
-        )
+        problems.append(too_small(smallest, view.reading_distance_m()))
     blur = speed_mps * view.exposure_s / view.module_m
     if blur > MAX_BLUR_MODULES:
         problems.append(
@@ -130,6 +151,15 @@ def check_coverage(site: Site, view: FrontView, speed_mps: float) -> Coverage:
         view.speed_limit_mps(),
         tuple(problems),
         tuple(uncovered),
+    )
+
+
+def too_small(px_per_module: float, within_m: float) -> str:
+    """What is wrong with labels of which the smallest gets so much of a picture, and what helps: it is read
+    `within_m`."""
+    return (
+        f"labels get {px_per_module:.2f} px per module, {MIN_PX_PER_MODULE:g} are needed: "
+        f"come within {within_m:.2f} m, or take a longer lens or larger labels"
     )
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import os
 import shutil
 import socket
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,8 @@ import pytest
 from flightd.runtime.free_ports import free_port
 
 _PROGRAM = shutil.which("mosquitto", path=os.environ.get("PATH", "") + os.pathsep + "/usr/sbin")
+_BEGINS_S = 20.0
+_LOOK_S = 0.02
 
 
 class Mosquitto:
@@ -35,11 +38,23 @@ class Mosquitto:
         return f"mqtt://127.0.0.1:{self.port}"
 
     def start(self) -> None:
-        """Run; whoever connects tries until it listens."""
+        """Run; whoever connects tries until it listens, or waits by `listens`."""
         assert _PROGRAM is not None
         self._process = subprocess.Popen(
             [_PROGRAM, "-c", str(self._config)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
+
+    async def listens(self) -> None:
+        """Wait until whoever connects is taken."""
+        async with asyncio.timeout(_BEGINS_S):
+            while True:
+                with contextlib.suppress(OSError):
+                    _, writer = await asyncio.open_connection("127.0.0.1", self.port)
+                    writer.close()
+                    with contextlib.suppress(ConnectionError):
+                        await writer.wait_closed()
+                    return
+                await asyncio.sleep(_LOOK_S)
 
     def kill(self) -> None:
         """As a power cut would."""
@@ -49,7 +64,7 @@ class Mosquitto:
             self._process = None
 
 
-@contextmanager
+@contextlib.contextmanager
 def mosquitto(folder: Path) -> Iterator[Mosquitto]:
     """A broker that runs meanwhile."""
     broker = Mosquitto(folder)

@@ -1,4 +1,4 @@
-"""The manager of a fleet at a real broker, for a drone called demo."""
+"""The manager of a fleet at a real broker, for one drone."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from tests.unit.fleet.vehicle_rig import validator
 class Manager:
     """A fleet's manager: everything that the broker has of one drone, each message held to its schema."""
 
-    def __init__(self, version: Version) -> None:
+    def __init__(self, version: Version, drone: str = "demo") -> None:
         self._version = version
-        self.top = f"{'uagv' if version is Version.V2_1 else 'vda5050'}/{version.topic}/flightd/demo"
+        self.top = f"{'uagv' if version is Version.V2_1 else 'vda5050'}/{version.topic}/flightd/{drone}"
         self.heard: list[tuple[str, dict[str, Any], bool]] = []
         self._client: aiomqtt.Client | None = None
 
@@ -40,14 +40,9 @@ class Manager:
     @contextlib.asynccontextmanager
     async def watching(self, broker: Mosquitto) -> AsyncIterator[None]:
         """It listens meanwhile."""
-        async with asyncio.timeout(20):
-            while True:
-                with contextlib.suppress(aiomqtt.MqttError):
-                    client = aiomqtt.Client("127.0.0.1", broker.port)
-                    await client.__aenter__()
-                    break
-                await asyncio.sleep(0.02)
-        self._client = client
+        await broker.listens()
+        self._client = client = aiomqtt.Client("127.0.0.1", broker.port)
+        await client.__aenter__()
         await client.subscribe(f"{self.top}/#")
         listening = asyncio.create_task(self._listen(client))
         try:

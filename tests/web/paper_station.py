@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import math
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -15,12 +15,16 @@ from flightd.adapters.ground_link.client import Address
 from flightd.adapters.ground_link.messages.answers import Accepted, Planned, Welcome
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.errors import UnavailableError
+from flightd.fleet.vda5050.codec import Version
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.drone_link import Pages
 from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.messages import Act
+from flightd.ground.mqtt.broker_address import read_broker
+from flightd.ground.mqtt.fleet_link import FleetLink
 from flightd.ground.mqtt.managed_drone import OrderRules
+from tests.rigs.broker import Mosquitto
 from tests.rigs.event_loops import real
 from tests.rigs.paper_drones import PaperDrone, hall
 from tests.web.served import Station, served
@@ -138,6 +142,18 @@ def paper_station(
                 end()
             thread.join(_READY_S)
             assert not thread.is_alive()
+
+
+@contextlib.asynccontextmanager
+async def managed_drone(broker: Mosquitto, version: Version) -> AsyncIterator[HeldDrone]:
+    """The drone `a` on paper, not held, of a station in this loop, which flies it by a manager's orders."""
+    station = PaperStation()
+    fleet = FleetLink(["a"], read_broker(broker.url), version, BODY, OrderRules(60.0, lambda *_: None))
+    with mock.patch("flightd.ground.hub.DroneLink", station.link):
+        async with served(("a", Address("127.0.0.1", 1, 2)), fleet=fleet):
+            drone = station.links["a"].drone
+            drone.held = False
+            yield drone
 
 
 def _url(station: Station) -> str:

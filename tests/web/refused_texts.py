@@ -112,6 +112,7 @@ STAYS_ENGLISH = {
 EXAMPLES = {
     "the {} camera delivers no picture": "the down camera delivers no picture",
     "this flight uses no {} camera": "this flight uses no front camera",
+    "{} places: {}": "48 places: labels cannot be read",
 }
 """Texts whose fields are no names."""
 

@@ -7,6 +7,7 @@ import contextlib
 import sys
 from pathlib import Path
 
+import aiomqtt
 import pytest
 
 from flightd.core.errors import InputError
@@ -20,6 +21,7 @@ from tests.rigs.ground_link import address_of, local, serving, telling
 from tests.rigs.waiting import until
 from tests.unit.fleet.vehicle_rig import instant, order
 from tests.web.fleet_manager import Manager, and_a_turn
+from tests.web.paper_station import managed_drone
 from tests.web.served import served
 
 BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
@@ -119,6 +121,32 @@ def test_of_a_station_that_is_killed_the_broker_says_so(tmp_path: Path) -> None:
 
     with mosquitto(tmp_path) as broker:
         real(and_a_turn(go(broker)))
+
+
+@pytest.mark.parametrize("turns", range(8))
+def test_what_ends_as_the_broker_answers_ends(
+    turns: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    publish, ended = aiomqtt.Client.publish, list[asyncio.Task[object]]()
+
+    async def published(client: aiomqtt.Client, topic: str, *args: object, **how: object) -> None:
+        task = asyncio.current_task()
+        if not ended and task is not None and topic.endswith("/visualization"):
+            ended.append(task)
+            end_in(turns, task)
+        await publish(client, topic, *args, **how)  # type: ignore[arg-type]
+
+    def end_in(left: int, task: asyncio.Task[object]) -> None:
+        asyncio.get_running_loop().call_soon(task.cancel if left == 0 else lambda: end_in(left - 1, task))
+
+    async def go(broker: Mosquitto) -> None:
+        await broker.listens()
+        async with managed_drone(broker, Version.V2_1):
+            await until(lambda: ended and ended[0].done(), 10)
+
+    monkeypatch.setattr(aiomqtt.Client, "publish", published)
+    with mosquitto(tmp_path) as broker:
+        real(and_a_turn(go(broker)), 4.0)
 
 
 def test_a_broker_is_named_by_its_url_and_no_refusal_tells_a_password() -> None:

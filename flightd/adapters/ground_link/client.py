@@ -379,7 +379,8 @@ class GroundClient:
         """The host's name stands for no address; not where nobody says so in time."""
         loop = asyncio.get_running_loop()
         try:
-            await asyncio.wait_for(loop.getaddrinfo(self._address.host, None), _NAME_S)
+            async with asyncio.timeout(_NAME_S):
+                await loop.getaddrinfo(self._address.host, None)
         except socket.gaierror:
             return True
         except (TimeoutError, OSError, UnicodeError):

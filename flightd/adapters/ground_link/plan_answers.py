@@ -6,7 +6,13 @@ from collections import deque
 
 import msgspec
 
-from flightd.adapters.ground_link.messages.answers import Code, PlanAnswer, Planned, PlannedPass
+from flightd.adapters.ground_link.messages.answers import (
+    Code,
+    PlanAnswer,
+    Planned,
+    PlannedPass,
+    PlannedUnread,
+)
 from flightd.adapters.ground_link.messages.requests import AskPlan, PlanFlight
 from flightd.core.errors import InputError
 from flightd.core.planned_flight import Planner
@@ -54,6 +60,7 @@ class PlanAnswers:
             charge=plan.charge,
             battery_s=round(plan.battery_s, 1),
             sweeps=tuple(msgspec.convert(each, PlannedPass, from_attributes=True) for each in plan.sweeps),
+            unread=msgspec.convert(plan.unread, PlannedUnread | None, from_attributes=True),
             dry=request.dry,
         )
 

@@ -3,8 +3,8 @@
 One observation is one transaction, so a power cut loses at most the location in work.  Observations are
 named by their content and only ever added; a location's state is that of its newest confirmed one.  One
 that is pending (the place it was seen at is not proven yet) counts for nothing; it is confirmed or
-withdrawn once, and withdrawn wins.  So writing the same again, or merging another drone's file in any
-order, ends in the same inventory.
+withdrawn.  A confirmed one is withdrawn where something contradicts it, and withdrawn wins.  So writing the
+same again, or merging another drone's file in any order, ends in the same inventory.
 """
 
 from __future__ import annotations
@@ -41,12 +41,14 @@ from flightd.core.inventory import (
 from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
-_VERSION = 6
+_VERSION = 7
 _WITH_TEXTS = 3
 """The first format with module sizes and printed text."""
 _WITH_FILLS = 4
 """The first that says how full places are."""
-_READABLE = (2, 3, 4, 5, _VERSION)
+_WITH_AGAIN = 6
+"""The first that says which looks are second ones."""
+_READABLE = (2, 3, 4, 5, 6, _VERSION)
 """Formats that are read as they are: what they lack is not known, and places are one pallet deep."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
@@ -55,7 +57,8 @@ _TAKEN_OVER = {
     2: ("ALTER TABLE code_read ADD COLUMN module_px REAL", *TEXT_TABLES),
     3: FILL_TABLES,
     4: LEAN_COLUMN,
-    5: (*CASE_COLUMNS, "ALTER TABLE location ADD COLUMN pallets_deep INTEGER NOT NULL DEFAULT 1"),
+    5: ("ALTER TABLE observation ADD COLUMN again INTEGER NOT NULL DEFAULT 0",),
+    6: (*CASE_COLUMNS, "ALTER TABLE location ADD COLUMN pallets_deep INTEGER NOT NULL DEFAULT 1"),
 }
 """What makes a file of each earlier format one of the next."""
 _SCHEMA = """
@@ -73,7 +76,8 @@ CREATE TABLE observation (
     confidence REAL NOT NULL CHECK (confidence BETWEEN 0 AND 1),
     node TEXT, x_m REAL, y_m REAL, height_m REAL, yaw_rad REAL,
     evidence TEXT NOT NULL,
-    standing INTEGER NOT NULL DEFAULT 1
+    standing INTEGER NOT NULL DEFAULT 1,
+    again INTEGER NOT NULL DEFAULT 0
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX newest ON observation (location, utc_ns, id);
 CREATE TABLE code_read (
@@ -246,6 +250,15 @@ class SqliteStore:
                 [(standing, location, run, Standing.PENDING) for location in locations],
             )
 
+    def contradict(self, run: str, locations: Iterable[str]) -> None:
+        """Withdraw every look of a run at these locations, confirmed ones, too: they stay in the history, and
+        the run has not counted there."""
+        with self._transaction():
+            self._db.executemany(
+                "UPDATE observation SET standing = ? WHERE location = ? AND run = ?",
+                [(Standing.WITHDRAWN, location, run) for location in locations],
+            )
+
     def withdraw_pending(self, run: str) -> None:
         """Withdraw what earlier flights of a run left pending: nobody is left to prove it."""
         with self._transaction():
@@ -280,10 +293,10 @@ class SqliteStore:
         self._db.execute("INSERT OR IGNORE INTO location (code, node) VALUES (?, ?)", (seen.location, node))
         where = (pose.node, pose.x_m, pose.y_m, pose.height_m, pose.yaw_rad) if pose else (None,) * 5
         cursor = self._db.execute(
-            "INSERT OR IGNORE INTO observation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT OR IGNORE INTO observation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
                 seen.id, seen.run, seen.location, seen.utc_ns, seen.state.value, seen.confidence, *where,
-                seen.evidence, standing,
+                seen.evidence, standing, seen.again,
             ),
         )  # fmt: skip
         if cursor.rowcount == 0:
@@ -354,8 +367,9 @@ class SqliteStore:
             reads.setdefault(seen, []).append(read)
         texts = kept_texts(self._db) if self._version >= _WITH_TEXTS else {}
         fills = kept_fills(self._db) if self._version >= _WITH_FILLS else {}
+        again = "again" if self._version >= _WITH_AGAIN else "0"
         rows = self._db.execute(
-            "SELECT id, run, location, utc_ns, state, confidence, evidence, "
+            f"SELECT id, run, location, utc_ns, state, confidence, evidence, {again}, "  # noqa: S608
             "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "
             "WHERE ?1 IS NULL OR location = ?1 ORDER BY utc_ns, id",
             (location,),
@@ -408,7 +422,8 @@ def _observation(
     texts: tuple[LabelValue, ...],
     fill: PlaceFill | None,
 ) -> Observation:
-    _, run, location, utc_ns, state, confidence, evidence, node, *place = row
+    _, run, location, utc_ns, state, confidence, evidence, again, node, *place = row
     pose = None if node is None else CountPose(node, *place)
     seen = LocationState(state)
-    return Observation(run, location, utc_ns, seen, confidence, reads, pose, evidence, texts, fill)
+    looked = run, location, utc_ns, seen, confidence, reads, pose, evidence, texts, fill
+    return Observation(*looked, again=bool(again))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Protocol
@@ -41,7 +40,8 @@ class Reading:
     shown: bytes = b""
 
 
-_MOST_EVIDENCE = 1000
+_MUCH_EVIDENCE = 500
+"""Pictures of 50 KB at most; with more, those that nobody will ask for are forgotten."""
 _MOST_SETS = 50
 _SHOWN_PX, _SHOWN_QUALITY = 960, 80
 """Width and quality of a picture for people."""
@@ -99,7 +99,9 @@ class ShelfWatch:
         self.places = places
         self.ground: Ground = NO_GROUND
         self._sets: list[CodeSet] = []
-        self._evidence: OrderedDict[str, bytes] = OrderedDict()
+        self._evidence: dict[str, bytes] = {}
+        self.wanted_evidence: Callable[[], Collection[str]] = tuple
+        """Which of the pictures that were taken are still wanted."""
         self.frames: Latest[FrameTicket] = Latest()
         self.read = 0
         self.lost = 0
@@ -133,8 +135,10 @@ class ShelfWatch:
         self.read += 1
         self._sets.append(codes)
         self._evidence.update(evidence)
-        while len(self._evidence) > _MOST_EVIDENCE:
-            self._evidence.popitem(last=False)
+        if len(self._evidence) > _MUCH_EVIDENCE:
+            new = (place.evidence for waiting in self._sets for place in waiting.places)
+            wanted = {*self.wanted_evidence(), *new}
+            self._evidence = {name: jpeg for name, jpeg in self._evidence.items() if name in wanted}
 
     def take(self) -> tuple[CodeSet, ...]:
         """What was read since the last call, in the order of the frames."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Collection
 from functools import partial
 
 from flightd.app.counting.code_readers import Readers, ShelfWatch
@@ -38,9 +38,12 @@ class Counting:
         self._findings: dict[str, Finding] = {}
         self._confirmed: set[str] = set()
 
-    def read_for(self, places: Callable[[int], tuple[Place, ...]]) -> None:
-        """`places` says what a frame exposed at a time is wanted for."""
-        self._watch.places = places
+    def read_for(
+        self, places: Callable[[int], tuple[Place, ...]], evidence: Callable[[], Collection[str]]
+    ) -> None:
+        """`places` says what a frame exposed at a time is wanted for, `evidence` which pictures of those that
+        were taken may still be asked for."""
+        self._watch.places, self._watch.wanted_evidence = places, evidence
 
     def show_on(self, ground: Ground) -> None:
         """Frames that `ground` asks for are shown to it."""
@@ -74,6 +77,7 @@ class Counting:
         """Hand a tick's findings to the inventory."""
         for finding in output.findings:
             self._findings[finding.location] = finding
+            self._confirmed.discard(finding.location)
             if self._writer is not None:
                 self._writer.put(finding, self._watch.evidence(finding.evidence))
         for settled in output.settled:

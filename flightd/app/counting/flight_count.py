@@ -12,7 +12,7 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.counting.code_readers import ReaderPool, Readers
 from flightd.app.counting.count import Counting
 from flightd.app.counting.store_writer import StoreWriter, nobody
-from flightd.app.counting.text_searcher import TextSearcher, needs_extra
+from flightd.app.counting.text_searcher import TextSearcher
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import PlannedLocation
@@ -20,6 +20,7 @@ from flightd.mission.plan.flight_plan import counts_shelves
 from flightd.ports import Clock
 from flightd.runtime.clock import Hold
 from flightd.site.site import Site
+from flightd.vision.shelf.text_reader import needs_extra
 
 
 class FlightCount:

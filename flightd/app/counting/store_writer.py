@@ -49,7 +49,7 @@ class StoreWriter:
         hold: Hold = nullcontext,
         on_written: Callable[[str, bytes], None] = nobody,
     ) -> None:
-        """`on_written` is told id and picture of what `run` has put on the disk, empty places aside."""
+        """`on_written` is told id and picture of what is on the disk now, empty places aside."""
         self._store = store
         self._on_written = on_written
         self._run = run
@@ -74,8 +74,7 @@ class StoreWriter:
         self._thread.shutdown()
         try:
             while self._queue:
-                self._write(self._queue[0])
-                self._forget()
+                self._forget(self._write(self._queue[0]))
         except UnavailableError as err:
             self._on_trouble(f"{len(self._queue)} findings are not in the inventory: {err}")
 
@@ -112,9 +111,7 @@ class StoreWriter:
                     wait_s = min(2 * wait_s, _LONGEST_WAIT_S)
                     continue
                 wait_s = _FIRST_WAIT_S
-                self._forget()
-                if written and isinstance(entry, tuple) and entry[1] and not _is_empty(entry[0]):
-                    self._on_written(written, entry[1])
+                self._forget(written)
             self._arrived.clear()
             await self._arrived.wait()
 
@@ -127,16 +124,22 @@ class StoreWriter:
         self._arrived.set()
         return True
 
-    def _forget(self) -> None:
-        """The first entry is on the disk."""
+    def _forget(self, written: str) -> None:
+        """The first entry is on the disk, as the observation `written` if it is one."""
         entry = self._queue.popleft()
-        self._pictures -= isinstance(entry, tuple) and bool(entry[1])
         self.written += 1
+        if isinstance(entry, tuple) and entry[1]:
+            self._pictures -= 1
+            if not _is_empty(entry[0]):
+                self._on_written(written, entry[1])
 
     def _write(self, entry: tuple[Finding, bytes] | Settled) -> str:
         """The id of the observation that was written, if one was."""
         if isinstance(entry, Settled):
-            self._store.settle(self._run, entry.locations, entry.confirmed)
+            if entry.booked:
+                self._store.contradict(self._run, entry.locations)
+            else:
+                self._store.settle(self._run, entry.locations, entry.confirmed)
             return ""
         finding, jpeg = entry
         evidence = self._store.keep_evidence(jpeg) if jpeg else ""
@@ -147,9 +150,8 @@ class StoreWriter:
     def _observation(self, f: Finding, evidence: str) -> Observation:
         pose = CountPose(f.node, f.x_m, f.y_m, f.height_m, f.yaw_rad)
         utc_ns = self._utc_at_zero_ns + f.stamp_ns
-        return Observation(
-            self._run, f.location, utc_ns, f.state, f.confidence, f.reads, pose, evidence, fill=f.fill
-        )
+        looked = self._run, f.location, utc_ns, f.state, f.confidence, f.reads, pose, evidence
+        return Observation(*looked, fill=f.fill, again=f.again)
 
     def _tell(self, text: str) -> None:
         now_ns = self._clock.now_ns()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import importlib.util
 import os
+import signal
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
@@ -13,7 +13,6 @@ from typing import Any, Protocol, Self
 
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.errors import TransientError, UnavailableError
-from flightd.core.extras import missing_extra
 from flightd.core.label_values import LabelValue
 from flightd.runtime.child_process import Child
 from flightd.runtime.clock import Hold
@@ -22,6 +21,8 @@ from flightd.vision.shelf.text_search import BrokenPictureError, TextSearch, sea
 _MOST_WAITING = 200
 """Pictures of 50 KB at most."""
 _NICE = 15
+_LONGEST_S = 60.0
+"""For one picture; a process that takes longer hangs, and ends."""
 _MOST_DEATHS = 3
 """Of the process; then nothing more is searched in this flight."""
 
@@ -30,13 +31,6 @@ class TextStore(Protocol):
     """Where values of printed text are kept."""
 
     def keep_texts(self, observation: str, texts: Sequence[LabelValue], asked: str) -> None: ...
-
-
-def needs_extra() -> UnavailableError | None:
-    """Why printed text is not read on this machine, if it is not."""
-    if importlib.util.find_spec("rapidocr") and importlib.util.find_spec("onnxruntime"):
-        return None
-    return missing_extra("ocr", "[[scan.text]]: printed text is not read, it")
 
 
 class TextSearcher:
@@ -57,7 +51,7 @@ class TextSearcher:
         self._asked = search_name(patterns)
         self._on_trouble = on_trouble
         self._hold = hold
-        self._make = make or partial(_searching, tuple(patterns))
+        self._make = partial(_in_time, make or partial(_searching, tuple(patterns)), _LONGEST_S)
         self._waiting: deque[tuple[str, bytes]] = deque(maxlen=_MOST_WAITING)
         self._arrived = asyncio.Event()
         self._child: Child | None = None
@@ -102,12 +96,14 @@ class TextSearcher:
             self._in_work = 0
 
     async def _found_in(self, jpeg: bytes) -> tuple[LabelValue, ...] | None:
-        """What the process finds; None where it died over it, or the picture is broken."""
+        """What the process finds; None where it died or hung over it, or the picture is broken."""
         child = await self._living_child()
         try:
             found: tuple[LabelValue, ...] | None = await child.ask(jpeg)
         except TransientError:
             self._child, self._deaths = None, self._deaths + 1
+            if self._deaths == _MOST_DEATHS:
+                self._on_trouble("inventory: printed text is read no more in this flight: its process dies")
             return None
         return found
 
@@ -130,6 +126,21 @@ class TextSearcher:
             self._child = Child(self._make, lambda _: self._ready.set(), lambda _: self._ready.set())
             await self._ready.wait()
         return self._child
+
+
+def _in_time(make: Callable[[], Callable[[bytes], Any]], longest_s: float) -> Callable[[bytes], Any]:
+    """What the process does, which the system ends where that takes too long: also in code that heeds no
+    signal handler, and whatever clock the flight goes by."""
+    search = make()
+
+    def searched(jpeg: bytes) -> Any:
+        signal.setitimer(signal.ITIMER_REAL, longest_s)
+        try:
+            return search(jpeg)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+    return searched
 
 
 def _searching(patterns: Sequence[LabelTextConfig]) -> Callable[[bytes], tuple[LabelValue, ...] | None]:

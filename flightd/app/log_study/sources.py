@@ -14,6 +14,9 @@ from flightd.core.errors import InputError, UnavailableError
 _ENDING: Final = ".mcap"
 _TRUTH: Final = "truth"
 """The simulator's own log beside that of a flight is not one."""
+_BESIDE: Final = ("truth.mcap", "summary.json", "inventory.db", "inventory.db-wal", "inventory.db-shm")
+_PICTURES: Final = "evidence"
+"""The inventory's, in folders of their own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,14 +28,15 @@ class LogSource:
 
     @contextlib.contextmanager
     def fetched(self) -> Iterator[Path]:
-        """The log as a file with all that lies beside it; gone afterwards if it had to be fetched."""
+        """The log as a file with what of its flight lies beside it; gone afterwards if it had to be fetched:
+        of a folder of many logs, no other is."""
         if "://" not in self.place:
             yield Path(self.place)
             return
         files, path = _file_system(self.place)
         with TemporaryDirectory(prefix="flightd-study-") as made:
             try:
-                files.get(str(PurePosixPath(path).parent) + "/", made + "/", recursive=True)
+                _fetch(files, PurePosixPath(path), Path(made))
             except OSError as err:
                 raise UnavailableError(f"cannot be fetched: {err}", file=self.place) from None
             yield Path(made) / PurePosixPath(path).name
@@ -73,6 +77,14 @@ def _remote(url: str) -> Iterator[LogSource]:
         if _is_flight(PurePosixPath(name).name):
             place = f"{scheme}://{name.removeprefix(f'{scheme}://')}"
             yield LogSource(place, place)
+
+
+def _fetch(files: Any, log: PurePosixPath, into: Path) -> None:
+    there = {PurePosixPath(name).name for name in files.ls(str(log.parent), detail=False)}
+    for name in (log.name, *(name for name in _BESIDE if name in there)):
+        files.get_file(str(log.parent / name), str(into / name))
+    if _PICTURES in there:
+        files.get(f"{log.parent / _PICTURES}/", f"{into / _PICTURES}/", recursive=True)
 
 
 def _is_flight(name: str) -> bool:

@@ -4,7 +4,7 @@ goal."""
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final, TypeAlias
 
 from flightd.fleet.traffic.motions import NEVER, MotionNet
@@ -14,15 +14,17 @@ _Chain: TypeAlias = tuple[tuple[int, int], ...]
 
 
 class Distances:
-    """Lower bounds by cruising speed alone, over all lanes, whoever is on them.
+    """Lower bounds by cruising speed alone, over all lanes but those that are `shut`, whoever is on them.
 
     Dijkstra's algorithm against the lanes, where an aisle without a crossing is one step: (vertex,
     milliseconds) of each vertex along it, as far as the first one that has several ways on."""
 
-    def __init__(self, net: MotionNet) -> None:
+    def __init__(self, net: MotionNet, shut: Collection[int] = ()) -> None:
         onto: list[dict[int, int]] = [{} for _ in net.lanes.vertices]
         for vertex, arcs in enumerate(net.lanes.arcs):
             for arc in arcs:
+                if arc.resource in shut:
+                    continue
                 lane_ms = net.lower_bound_ms(arc)
                 onto[arc.to][vertex] = min(lane_ms, onto[arc.to].get(vertex, NEVER))
         self._onto = onto

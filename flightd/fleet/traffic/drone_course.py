@@ -44,6 +44,11 @@ class DroneCourse:
         return self.ahead[self.released - self.done :]
 
     @property
+    def is_pushed_aside(self) -> bool:
+        """What is not released ends where it may not stay for good."""
+        return bool(self.tail) and self.ahead[-1].vertex not in self.ends
+
+    @property
     def air(self) -> list[int]:
         """Every resource on which the drone may be now, for all that is known."""
         return [self.place, *(action.resource for action in self.base)]

@@ -18,9 +18,9 @@ from flightd.fleet.traffic.closures import ClosedAir
 from flightd.fleet.traffic.drone_course import DroneCourse
 from flightd.fleet.traffic.lanes import LaneGraph
 from flightd.fleet.traffic.motions import NEVER, Act, MotionNet, at_rest
-from flightd.fleet.traffic.pibt import Pushed, plan_by_pushing
 from flightd.fleet.traffic.plan import Action, Plan, Stop, occupancy
 from flightd.fleet.traffic.prioritised import FixedBookings, PrioritisedPlanner
+from flightd.fleet.traffic.pushing import Pushed, cut_off, plan_by_pushing
 from flightd.fleet.traffic.tours import Request
 from flightd.mission.plan.leg_times import Pace
 
@@ -211,15 +211,18 @@ class TrafficControl:
 
     def replan(self, drones: Iterable[str], now_ms: int) -> tuple[str, ...]:
         """Plan what is not released of these drones anew, all together.  Those for which there is no way,
-        even without stops, hold where their base ends, and are returned."""
+        even without stops, hold where their base ends or go on making room, and are returned."""
         return self._replan(set(drones), self.projected(now_ms), now_ms)
 
     def _replan(
         self, todo: set[str], projected: Mapping[str, Sequence[Action]], now_ms: int
     ) -> tuple[str, ...]:
         todo = {drone for drone in todo if not self.drones[drone].failed}
+        aside = self._making_room(todo, projected, now_ms)
+        todo -= aside
         holding: set[str] = set()
         at_large: set[str] = set()
+        may_push = True
         shut, _ = self._shut(())
         for drone in todo:
             course = self.drones[drone]
@@ -240,32 +243,59 @@ class TrafficControl:
             if barred := {d for d in planned.without if not closed.isdisjoint(self.drones[d].air)} - at_large:
                 at_large |= barred
                 continue
-            if not holding and (pushed := self._pushed(projected, now_ms)):
-                for drone in pushed:
-                    self.drones[drone].stops = ()
-                self._adopt(projected, pushed)
-                return ()
-            holding |= set(planned.without)
+            stuck = cut_off(self.net, self._to_push(planned.without, projected, now_ms))
+            if not stuck and may_push:
+                may_push = False
+                if self._push_home(projected, now_ms):
+                    return tuple(sorted(holding | aside))
+            holding |= stuck or set(planned.without)
             todo |= holding | self._met_by(holding, projected)
         plans = {**planned.plans, **{drone: Plan(()) for drone in holding}}
         self._adopt(projected, plans)
-        return tuple(sorted(holding))
+        return tuple(sorted(holding | aside))
 
-    def _pushed(self, projected: Mapping[str, Sequence[Action]], now_ms: int) -> dict[str, Plan] | None:
-        """Everybody sent home by PIBT, whatever they had ahead."""
+    def _making_room(
+        self, drones: Collection[str], projected: Mapping[str, Sequence[Action]], now_ms: int
+    ) -> frozenset[str]:
+        """Those of them that are cut off and were pushed out of others' way: planned anew they would stop
+        in it."""
+        pushed = [drone for drone in drones if self.drones[drone].is_pushed_aside]
+        return cut_off(
+            self.net,
+            [
+                each
+                for each in self._to_push(pushed, projected, now_ms)
+                if each.shut.isdisjoint(action.resource for action in self.drones[each.drone].tail)
+            ],
+        )
+
+    def _push_home(self, projected: Mapping[str, Sequence[Action]], now_ms: int) -> bool:
+        """Everybody goes home by pushing, whatever he had ahead; False, and nothing has changed, where no way
+        was found."""
+        flying = [drone for drone, course in self.drones.items() if not course.failed]
+        plans = plan_by_pushing(self.net, self.conflicts, self._to_push(flying, projected, now_ms))
+        if plans is None:
+            return False
+        for drone in flying:
+            self.drones[drone].stops = ()
+        self._adopt(projected, plans)
+        return True
+
+    def _to_push(
+        self, drones: Collection[str], projected: Mapping[str, Sequence[Action]], now_ms: int
+    ) -> list[Pushed]:
+        """These drones where their bases end, with what is closed for each."""
         wrecks = {
             other for course in self.drones.values() for r in course.wreck for other in self.conflicts[r]
         }
-        flying = [drone for drone, course in self.drones.items() if not course.failed]
-        shut, inside = self._shut(flying, flying)
-        drones: list[Pushed] = []
-        for drone in flying:
+        shut, inside = self._shut(drones, drones)
+        found: list[Pushed] = []
+        for drone in drones:
             request = self._request(drone, projected, now_ms)
             base = tuple(action.resource for action in self.drones[drone].base)
             avoided = frozenset(inside.get(drone, shut) | wrecks)
-            end = request.ends[0]
-            drones.append(Pushed(drone, request.configuration, request.at_ms, end, base, avoided))
-        return plan_by_pushing(self.net, self.conflicts, self._planner.distances, drones)
+            found.append(Pushed(drone, request.configuration, request.at_ms, request.ends, base, avoided))
+        return found
 
     def _met_by(self, holding: Collection[str], projected: Mapping[str, Sequence[Action]]) -> set[str]:
         """Who would pass where one of these drones holds."""

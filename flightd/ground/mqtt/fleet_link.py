@@ -8,8 +8,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import secrets
-from collections.abc import Iterable
+from collections.abc import AsyncIterator, Awaitable, Iterable
 from typing import Any, Final
 
 import aiomqtt
@@ -34,6 +35,8 @@ _INTERFACES: Final = {Version.V2_1: "uagv", Version.V3_0: "vda5050"}
 _SHOWN_EVERY_S: Final = 0.5
 _AGAIN_S: Final = (1.0, 2.0, 5.0, 10.0)
 _ANSWER_S: Final = 5.0
+_CONNECT_S: Final = 10.0
+"""Half of it is paho's own, for a host that takes no connection."""
 _LEAVE_S: Final = 1.0
 _MOST_WAITING: Final = 32
 _LOOK_S: Final = 0.1
@@ -66,26 +69,12 @@ class DroneAtBroker:
 
     async def _connected(self) -> None:
         vehicle = self._drone.vehicle
-        will = vehicle.connection(ConnectionState.CONNECTION_BROKEN, self._drone.now())
-        client = aiomqtt.Client(
-            self._broker.host,
-            self._broker.port,
-            username=self._broker.user,
-            password=self._broker.password,
-            tls_params=aiomqtt.TLSParameters() if self._broker.tls else None,
-            identifier=f"flightd-{self._name}-{secrets.token_hex(4)}",
-            will=aiomqtt.Will(self._at(Connection), encoded(will, self._version), qos=1, retain=True),
-            timeout=_ANSWER_S,
-            keepalive=15,
-            max_queued_incoming_messages=_MOST_WAITING,
-            logger=_QUIET,
-        )
-        async with client:
+        async with self._client() as client:
             self._failures = 0
             try:
                 async with asyncio.TaskGroup() as tasks:
                     for kind in (Order, InstantActions):
-                        await client.subscribe(self._at(kind))
+                        await _answered(client.subscribe(self._at(kind)))
                     self._drone.at_broker = True
                     tasks.create_task(self._listen(client), name=f"{self._name} at the broker")
                     tasks.create_task(self._say(client), name=f"{self._name} to the broker")
@@ -95,6 +84,30 @@ class DroneAtBroker:
                     async with asyncio.timeout(_LEAVE_S):
                         gone = vehicle.connection(ConnectionState.OFFLINE, self._drone.now())
                         await self._publish(client, gone)
+
+    @contextlib.asynccontextmanager
+    async def _client(self) -> AsyncIterator[aiomqtt.Client]:
+        """Connected meanwhile."""
+        will = self._drone.vehicle.connection(ConnectionState.CONNECTION_BROKEN, self._drone.now())
+        client = aiomqtt.Client(
+            self._broker.host,
+            self._broker.port,
+            username=self._broker.user,
+            password=self._broker.password,
+            tls_params=aiomqtt.TLSParameters() if self._broker.tls else None,
+            identifier=f"flightd-{self._name}-{secrets.token_hex(4)}",
+            will=aiomqtt.Will(self._at(Connection), encoded(will, self._version), qos=1, retain=True),
+            timeout=math.inf,  # see _answered
+            keepalive=15,
+            max_queued_incoming_messages=_MOST_WAITING,
+            logger=_QUIET,
+        )
+        await _answered(client.__aenter__(), _CONNECT_S)
+        try:
+            yield client
+        finally:
+            with contextlib.suppress(aiomqtt.MqttError):  # why it is left counts, and no more
+                await _answered(client.__aexit__(None, None, None))
 
     async def _listen(self, client: aiomqtt.Client) -> None:
         async for message in client.messages:
@@ -139,12 +152,21 @@ class DroneAtBroker:
     async def _publish(self, client: aiomqtt.Client, message: Header) -> None:
         kind = type(message)
         qos = 1 if kind is Connection else 0
-        await client.publish(
-            self._at(kind), encoded(message, self._version), qos=qos, retain=kind in _RETAINED
-        )
+        data = encoded(message, self._version)
+        await _answered(client.publish(self._at(kind), data, qos=qos, retain=kind in _RETAINED))
 
     def _at(self, kind: type[Header]) -> str:
         return f"{self._topic}/{TOPICS[kind]}"
+
+
+async def _answered(wait: Awaitable[object], within_s: float = _ANSWER_S) -> None:
+    """Wait for the broker; MqttError where it takes too long.  The client's own bound is `asyncio.wait_for`,
+    which before Python 3.12 loses a cancellation that comes together with the answer."""
+    try:
+        async with asyncio.timeout(within_s):
+            await wait
+    except TimeoutError:
+        raise aiomqtt.MqttError("no answer in time") from None
 
 
 class FleetLink(VehicleSides):

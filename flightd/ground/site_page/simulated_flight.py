@@ -170,7 +170,8 @@ class SimulatedFlight:
 
 async def _is_over(process: asyncio.subprocess.Process, within_s: float) -> bool:
     with contextlib.suppress(TimeoutError):
-        await asyncio.wait_for(process.wait(), within_s)
+        async with asyncio.timeout(within_s):
+            await process.wait()
     return process.returncode is not None
 
 

@@ -18,7 +18,8 @@ _LONGEST_WAY_NS: Final = 180 * 10**9
 @dataclass(frozen=True, slots=True)
 class RunFigures:
     """One run.  `locations` are those with a look that counts, in the `states` that the run's newest one
-    gives; `looked_again` those that it looked at more than once; `withdrawn` looks count for nothing.
+    gives; `looked_again` those that it looked at more than once: also those that it had flown past and left
+    open, of which only the second look is there; `withdrawn` looks count for nothing.
 
     `hours` are those between its looks without the breaks, on the way in and home not counted."""
 
@@ -69,6 +70,7 @@ def _figures(looks: Sequence[Look]) -> RunFigures:
     times = sorted(seen.utc_ns for seen, _ in looks)
     counted = counted_of_run(looks, run)
     per_place = Counter(seen.location for seen, _ in looks)
+    again = {seen.location for seen, _ in looks if seen.again}
     flown_ns = sum(gap for a, b in pairwise(times) if (gap := b - a) <= _LONGEST_WAY_NS)
     return RunFigures(
         run=run,
@@ -77,7 +79,7 @@ def _figures(looks: Sequence[Look]) -> RunFigures:
         looks=len(looks),
         withdrawn=sum(standing is Standing.WITHDRAWN for _, standing in looks),
         locations=len(counted),
-        looked_again=sum(per_place[place] > 1 for place in counted),
+        looked_again=sum(per_place[place] > 1 or place in again for place in counted),
         states=dict(Counter(seen.state for seen in counted.values())),
         hours=flown_ns / 3.6e12,
     )

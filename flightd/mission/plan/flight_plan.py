@@ -7,8 +7,9 @@ the longer side of the down camera's picture is turned along the way.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from flightd.config.mission import Heading
@@ -85,6 +86,22 @@ class FlightPlan:
     def nodes(self) -> int:
         """Nodes that are visited, each counted once."""
         return len({stop.node for stop in self.stops if stop.visit})
+
+
+def run_of(site: Site, stops: Sequence[Stop]) -> tuple[str, ...]:
+    """The first of some stops and the visits that follow it in its aisle without another stop between."""
+    aisle = site.nodes[stops[0].node].aisle if stops else ""
+    visits = itertools.takewhile(lambda stop: stop.visit and site.nodes[stop.node].aisle == aisle, stops)
+    return tuple(stop.node for stop in visits)
+
+
+def runs_of(site: Site, stops: Sequence[Stop]) -> Iterator[tuple[str, ...]]:
+    """All visits of some stops, run by run."""
+    while stops:
+        run = run_of(site, stops)
+        if run:
+            yield run
+        stops = stops[max(len(run), 1) :]
 
 
 def make_plan(

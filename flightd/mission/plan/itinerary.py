@@ -11,7 +11,7 @@ from flightd.config.mission import Heading
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import EventLevel, GridPose
 from flightd.mission.event_log import EventLog
-from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop, make_plan
+from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop, make_plan, run_of
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.reasons import Reason, in_words
 from flightd.site.site import Site
@@ -87,11 +87,7 @@ class Itinerary:
     @property
     def run(self) -> tuple[str, ...]:
         """The goal and the visits that follow it in its aisle without another stop between."""
-        aisle = self._site.nodes[self.goal.node].aisle
-        following = itertools.takewhile(
-            lambda stop: stop.visit and self._site.nodes[stop.node].aisle == aisle, self._stops[self._next :]
-        )
-        return tuple(stop.node for stop in following)
+        return run_of(self._site, self._stops[self._next :])
 
     @property
     def _run_left(self) -> tuple[str, ...]:
@@ -289,16 +285,35 @@ class Itinerary:
                 ends, yaw_rad = (due[0], self._home), self.goal.yaw_rad
                 rest = make_plan(self._site, nodes, *ends, self._policy, yaw_rad, waits=self._waits)
             except NoWayError as err:
-                self._events.report(
-                    now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} left out: {err}"
-                )
+                self._leave_out(now_ns, due, err)
                 return
             self._stops[self._next :] = rest.stops
             self._run = ()
         else:
             self._left_over = (*due, *self._left_over)
+        self._note_recount(now_ns, due)
+
+    def recount_next(self, now_ns: int, due: Sequence[str]) -> None:
+        """Visit nodes again whose count was taken back, from the goal, at which the drone rests; one that is
+        led from node to node flies to none by itself."""
+        due = [node for node in due if node in self.visited]
+        if not due or self._waits:
+            return
+        try:
+            rest = self._onward(self.goal, [*due, *self.ahead])
+        except NoWayError as err:
+            self._leave_out(now_ns, due, err)
+            return
+        self._stops[self._next + 1 :] = rest.stops
+        self._note_recount(now_ns, due)
+
+    def _note_recount(self, now_ns: int, due: Sequence[str]) -> None:
         self.visited = [node for node in self.visited if node not in due]
         self._events.report(now_ns, EventLevel.WARNING, "recount", f"{', '.join(due)} to visit again")
+
+    def _leave_out(self, now_ns: int, due: Sequence[str], err: NoWayError) -> None:
+        text = f"{', '.join(due)} left out: {err}"
+        self._events.report(now_ns, EventLevel.WARNING, "recount", text)
 
     def resume_from_pad(self, now_ns: int) -> None:
         """Stand on the pad that was flown to, with what was left over ahead."""

@@ -53,6 +53,11 @@ class LocationVotes:
         return self._seen.total()
 
     @property
+    def evidence(self) -> str:
+        """The name of the best picture of it so far; empty where there is none."""
+        return self._evidence
+
+    @property
     def any_read(self) -> bool:
         """Whether any code was read here, believed or not."""
         return self._votes.any_read

@@ -28,6 +28,7 @@ class NoScan:
     looking = False
     decided = 0
     sweeps = False
+    evidence: frozenset[str] = frozenset()
 
     def wants(self, _node: str) -> bool:
         return False
@@ -69,7 +70,9 @@ class NoScan:
     def leave(self) -> None:
         """Nothing is left."""
 
-    def told_sweeps(self, _nodes: Iterable[str], _levels: Sequence[int] = ()) -> tuple[PlannedSweep, ...]:
+    def told_sweeps(
+        self, _runs: Iterable[Sequence[str]], _levels: Sequence[int] = ()
+    ) -> tuple[PlannedSweep, ...]:
         return ()
 
     def legs(

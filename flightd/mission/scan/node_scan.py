@@ -148,6 +148,11 @@ class ScanTask:
             view = replace(view, exposure=self._usual[0])
         return self._planner.retake(view, left)
 
+    @property
+    def evidence(self) -> tuple[str, ...]:
+        """The best pictures of what is not decided yet."""
+        return tuple(votes.evidence for votes in self._open.values())
+
     def drain(self) -> tuple[Finding, ...]:
         """The locations decided since the last call."""
         found, self._findings = tuple(self._findings), []

@@ -48,14 +48,13 @@ class PendingFindings:
         at.locations.append(location)
         at.stops = 0
 
-    def recall(self, location: str) -> bool:
-        """What was found at one location counts no more; False where it is confirmed already."""
-        at = next((at for at in self._nodes if location in at.locations), None)
-        if at is None:
-            return False
-        at.locations.remove(location)
-        self._settled.append(Settled((location,), confirmed=False))
-        return True
+    def recall(self, location: str, node: str) -> None:
+        """What was found at one location counts no more, whether or not it is confirmed; its node is due
+        again."""
+        for at in self._nodes:
+            at.locations = [code for code in at.locations if code != location]
+        self._settled.append(Settled((location,), confirmed=False, booked=True))
+        self._due += [node] * (node not in self._due)
 
     def reached(self, node: str, present: str) -> None:
         """Another certain stop: it proves what lies far enough back."""

@@ -20,16 +20,17 @@ from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, ShelfLook, Sighting
-from flightd.mission.scan.code_identity import names_one_thing
+from flightd.mission.scan.code_owners import CodeOwners
 from flightd.mission.scan.face_light import USUAL, Face, FaceLight, LegLight
 from flightd.mission.scan.label_checks import LabelChecks
 from flightd.mission.scan.node_scan import ScanTask
 from flightd.mission.scan.passing_time import PassingTime
 from flightd.mission.scan.pending_findings import PendingFindings
-from flightd.mission.scan.sweep_planner import SweepPlanner, told
+from flightd.mission.scan.sweep_planner import JudgedLane, SweepPlanner
 from flightd.mission.scan.sweep_speed import SweepOptics
 from flightd.mission.scan.sweep_task import SweepTask
 from flightd.mission.scan.sweep_votes import Undecided
+from flightd.mission.scan.told_sweeps import told
 from flightd.mission.scan.views import View, ViewPlanner, views_s
 from flightd.site.site import Site
 
@@ -64,7 +65,7 @@ class Scanner:
         self._light = FaceLight(params.expert.darker, params.expert.brighter, params.sweep.most_gain)
         self._shot = USUAL
         self._swept: set[str] = set()
-        self._owners: dict[str, str] = {}
+        self._owners = CodeOwners()
         self._aisle_of = {node.id: node.aisle for node in site.nodes.values()}
         self._planned = self._wanted = frozenset(site.locations)
         self._levels = {location.code: location.level for location in site.locations.values()}
@@ -163,7 +164,7 @@ class Scanner:
         self.leave()
         self._done.clear()
         self._swept.clear()
-        self._owners.clear()
+        self._owners = CodeOwners()
         self._begun = self._begun_blind = 0
 
     def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
@@ -234,7 +235,7 @@ class Scanner:
         self._break_off()
         codes = self._pending.withdraw()
         self._done.difference_update(codes)
-        self._owners = {text: code for text, code in self._owners.items() if code not in codes}
+        self._owners.forget(codes)
         if codes or (self._labels.contradict and not self.doubted):
             text = f"{reason}; {len(codes)} findings withdrawn"
             self._events.append(Event(now_ns, EventLevel.WARNING, "map_contradiction", text))
@@ -263,13 +264,20 @@ class Scanner:
         """Whether shelves are counted in passing first."""
         return self._sweeps is not None
 
-    def told_sweeps(self, nodes: Iterable[str], levels: Sequence[int] = ()) -> tuple[PlannedSweep, ...]:
-        """How what hangs at some nodes, on all levels or these, is flown past; empty where it never is."""
+    def told_sweeps(
+        self, runs: Iterable[Sequence[str]], levels: Sequence[int] = ()
+    ) -> tuple[PlannedSweep, ...]:
+        """How what hangs at the nodes of `runs`, each in one aisle and begun at its first node, is flown past
+        on all levels or these, and why where it is not; empty where nothing ever is."""
         if self._sweeps is None:
             return ()
-        codes = [code for node in nodes for code in self.places_at(node, levels)]
-        aisles = dict.fromkeys(self._aisle_of[self._node_of[code]] for code in codes)
-        return told(lane for aisle in aisles for lane in self._sweeps.lanes(aisle, codes))
+        lanes: list[JudgedLane] = []
+        before: frozenset[str] = frozenset()
+        for run in runs:
+            codes = frozenset(code for node in run for code in self.places_at(node, levels)) - before
+            lanes += self._sweeps.judged(run, codes, run[0], 0.0, 0.0)
+            before |= codes
+        return told(lanes)
 
     def legs(self, run: Sequence[str], here: str, yaw_rad: float, height_m: float) -> tuple[SweepLeg, ...]:
         """The legs past what is left to count at the nodes `run` of an aisle, for a drone over its node
@@ -312,6 +320,7 @@ class Scanner:
         if self._sweep is not None:
             if leg is not None:
                 self._shot = self._light.shot(_faces(leg), self._leg_light(leg), flown_mps)
+                self._sweep.fly(now_ns, leg)
             if not self._light.follows:
                 self._fix_exposure(now_ns)
             self._sweep.step(now_ns)
@@ -420,6 +429,14 @@ class Scanner:
         found, self._found = tuple(self._found), []
         return found, self._pending.drain()
 
+    @property
+    def evidence(self) -> frozenset[str]:
+        """The pictures that a finding names, or may name yet; no other one that was taken will be."""
+        named = [found.evidence for found in self._found]
+        for task in (self._task, self._sweep):
+            named += task.evidence if task is not None else ()
+        return frozenset(named)
+
     def drain_events(self) -> list[Event]:
         events, self._events = self._events, []
         return events
@@ -441,39 +458,33 @@ class Scanner:
         if self._task is None:
             return
         for found in self._task.drain():
-            self._found.append(found)
-            self._done.add(found.location)
             self._pending.add(found.location)
+            self._count(replace(found, again=found.location in self._swept))
 
     def _gather_sweep(self) -> None:
-        """Take what was decided in passing, unless it is at another place as well."""
+        """Take what was decided in passing."""
         assert self._sweep is not None
         for found in self._sweep.drain():
             self._swept.add(found.location)
-            others = self._elsewhere(found)
-            if others:
-                self._sweep.undecided[found.location] = Undecided.ELSEWHERE
-                self._recall(found, others)
-                continue
-            self._owners.update((read.text, found.location) for read in found.reads)
-            self._found.append(found)
-            self._done.add(found.location)
             self._pending.add_at(found.node, found.location)
+            again = self._count(found)
+            self._sweep.undecided.update(dict.fromkeys(again, Undecided.ELSEWHERE))
         self._swept.update(self._sweep.undecided)
 
-    def _elsewhere(self, found: Finding) -> set[str]:
-        """The places at which this flight has found the same single thing."""
-        texts = (read.text for read in found.reads if names_one_thing(read))
-        return {self._owners[text] for text in texts if text in self._owners} - {found.location}
-
-    def _recall(self, found: Finding, others: Iterable[str]) -> None:
-        """One thing cannot be at two places: both are counted again, by stopping."""
-        for other in others:
-            if other in self._done:
-                self._pending.recall(other)
-                self._done.discard(other)
-                text = f"one code at {other} and {found.location}: both are looked at again"
-                self._events.append(Event(found.stamp_ns, EventLevel.WARNING, "contradiction", text))
+    def _count(self, found: Finding) -> frozenset[str]:
+        """A finding, whichever way it came.  The places that it takes back, maybe its own: they are counted
+        again, by stopping."""
+        self._found.append(found)
+        self._done.add(found.location)
+        against = self._owners.take(found)
+        if against is None:
+            return frozenset()
+        for place in against.again:
+            self._done.discard(place)
+            self._swept.add(place)
+            self._pending.recall(place, self._node_of[place])
+        self._events.append(Event(found.stamp_ns, EventLevel.WARNING, "contradiction", str(against)))
+        return against.again
 
     def _passed_s(self, node: str, pace: Pace, levels: Sequence[int] | None) -> float:
         """A node's share of the time in which its aisle is counted in passing; 0 where it is not."""

@@ -38,6 +38,11 @@ class ShelfScan:
         self._apart_m = _least_apart_m(site)
 
     @property
+    def sweeping(self) -> bool:
+        """Whether shelves are flown past, which ends with stops before what that leaves open."""
+        return self._sweeping
+
+    @property
     def blind(self) -> NothingRead | None:
         """Why the count is none, if it is."""
         return self._scanner.blind

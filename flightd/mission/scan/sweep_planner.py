@@ -7,18 +7,20 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from flightd.core.geometry import wrap_pi
-from flightd.core.planned_flight import PlannedSweep
 from flightd.core.scanning import BodyPose
 from flightd.mission.plan.leg_times import Pace, profile_s
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.code_assignment import Assigner
-from flightd.mission.scan.sweep_speed import LIMIT_WORDS, Shelf, SweepOptics, SweepSpeed, sweep_speed
+from flightd.mission.scan.sweep_speed import Shelf, StopCause, SweepOptics, SweepSpeed, sweep_speed
 from flightd.mission.scan.views import View, ViewPlanner, up_and_down
+from flightd.site.coverage import Legibility
 from flightd.site.site import Location, Side, Site
 from flightd.site.ways import NoWayError
 
 _WHOLE_SHARE = 0.9
 """Levels are flown past together only where each place of them is so far in the picture."""
+_APART_M = 0.05
+"""Lanes that are nearer to each other in height show the same: all is flown past at once."""
 _LEADS_OUT = 2
 """So many nodes beyond what is counted a way is flown on to leave the aisle: farther may be for nothing."""
 _LEAST_NODES = 2
@@ -28,7 +30,7 @@ _LEAST_NODES = 2
 @dataclass(frozen=True, slots=True)
 class Lane:
     """The levels of one side of an aisle that are flown past at once, from their height: `places` on them by
-    the node that faces each."""
+    the node that faces each.  `legibility` is that of their labels where the drone stops before them."""
 
     aisle: str
     side: Side
@@ -38,6 +40,7 @@ class Lane:
     distance_m: float
     speed: SweepSpeed
     places: tuple[Location, ...]
+    legibility: Legibility
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,49 +57,12 @@ class _Way:
         return tuple(nodes[i] for i in range(self.start, self.target + step, step))
 
 
-def told(lanes: Iterable[Lane]) -> tuple[PlannedSweep, ...]:
-    """What is flown past and how, in words and numbers; lanes that are alike in many aisles are told once."""
-    alike: dict[tuple[object, ...], list[Lane]] = {}
-    for lane in lanes:
-        key = lane.levels, round(lane.height_m, 2), round(lane.distance_m, 2), round(lane.speed.speed_mps, 3)
-        alike.setdefault((*key, lane.speed.limit, lane.speed.readable), []).append(lane)
-    return tuple(_told(group) for group in alike.values())
+@dataclass(frozen=True, slots=True)
+class JudgedLane:
+    """A lane, and why it is not flown past; None: it is."""
 
-
-def _told(lanes: Sequence[Lane]) -> PlannedSweep:
-    lane, speed = lanes[0], lanes[0].speed
-    aisles = tuple(dict.fromkeys(lane.aisle for lane in lanes))
-    what = f"{_named('aisle', aisles)}, {_named('level', lane.levels)}"
-    text = (
-        f"{what}: {speed.speed_mps:.2f} m/s at {lane.height_m:.2f} m, {lane.distance_m:.2f} m from the shelf,"
-        f" {speed.views:.1f} whole views of each place at {speed.fps:g} frames a second; no faster because of"
-        f" {LIMIT_WORDS[speed.limit]}"
-    )
-    if not speed.readable:
-        text = f"{what}: by stopping, its labels have {speed.px_per_module:.2f} pixels for each module"
-    return PlannedSweep(
-        aisles=aisles,
-        levels=lane.levels,
-        places=sum(len(lane.places) for lane in lanes),
-        height_m=round(lane.height_m, 3),
-        distance_m=round(lane.distance_m, 3),
-        speed_mps=round(speed.speed_mps, 3),
-        limit=speed.limit.value,
-        limits_mps={limit.value: round(value, 3) for limit, value in speed.limits_mps},
-        exposure=round(speed.exposure, 3),
-        blur_modules=round(speed.blur_modules, 3),
-        px_per_module=round(speed.px_per_module, 2),
-        views=round(speed.views, 1),
-        fps=round(speed.fps, 2),
-        needed_fps=round(speed.needed_fps, 2),
-        swept=speed.readable,
-        text=text,
-    )
-
-
-def _named(kind: str, names: Sequence[object]) -> str:
-    texts = list(map(str, names))
-    return f"{kind} {texts[0]}" if len(texts) == 1 else f"{kind}s {', '.join(texts[:-1])} and {texts[-1]}"
+    lane: Lane
+    stops_for: StopCause | None
 
 
 class SweepPlanner:
@@ -129,17 +95,45 @@ class SweepPlanner:
     ) -> tuple[SweepLeg, ...]:
         """The legs over the nodes `run` of one aisle for a drone over its node `here`, from end to end, up
         one side and down the other; none where all is sooner counted by stopping, or may only be so."""
-        site = self._site
-        aisle = site.nodes[here].aisle
-        nodes = [node.id for node in site.aisle_nodes(aisle)]
-        counted = [code for code in wanted if site.locations[code].node in set(run)]
-        lanes = [lane for lane in self.lanes(aisle, counted) if lane.speed.readable]
+        nodes = self._nodes(here)
+        ways = self._ways(nodes, self._lanes_at(run, wanted, here), here, yaw_rad, height_m)
+        flown = [nodes.index(node) for node in run]
+        for end in (min(flown), max(flown)):
+            self._lead_over(nodes, ways, end)
+        self._lead_out(nodes, ways)
+        legs = [_leg(way.lane, way.passed(nodes)) for way in ways]
+        return (*legs[:-1], replace(legs[-1], last=True)) if legs else ()
+
+    def judged(
+        self, run: Sequence[str], wanted: frozenset[str], here: str, yaw_rad: float, height_m: float
+    ) -> list[JudgedLane]:
+        """All lanes of what `legs` is asked for, in the order of `lanes`, and which of them it flies past."""
+        lanes, nodes = self._lanes_at(run, wanted, here), self._nodes(here)
+        flown = [way.lane for way in self._ways(nodes, lanes, here, yaw_rad, height_m)]
+        return [
+            JudgedLane(lane, None if lane in flown else self._hindrance(nodes, lane) or StopCause.LINE)
+            for lane in lanes
+        ]
+
+    def _nodes(self, here: str) -> list[str]:
+        """Those of the aisle of a node, along it."""
+        return [node.id for node in self._site.aisle_nodes(self._site.nodes[here].aisle)]
+
+    def _lanes_at(self, run: Sequence[str], wanted: frozenset[str], here: str) -> list[Lane]:
+        """Past what is wanted at the nodes `run`."""
+        counted = [code for code in wanted if self._site.locations[code].node in set(run)]
+        return self.lanes(self._site.nodes[here].aisle, counted)
+
+    def _ways(
+        self, nodes: Sequence[str], lanes: Sequence[Lane], here: str, yaw_rad: float, height_m: float
+    ) -> list[_Way]:
+        """Past those of the lanes that can be flown past, joined, from the node `here`."""
         ways: list[_Way] = []
         at = nodes.index(here)
-        for lane in _ordered(lanes, yaw_rad, height_m):
-            faced = [nodes.index(place.node) for place in lane.places]
-            low, high = min(faced), max(faced)
-            if high - low + 1 < _LEAST_NODES or not self._is_open(nodes, min(low, at), max(high, at), lane):
+        passed = [lane for lane in lanes if self._hindrance(nodes, lane) is None]
+        for lane in _ordered(passed, yaw_rad, height_m):
+            low, high = _reach(nodes, lane)
+            if not self._is_open(nodes, min(low, at), max(high, at), lane):
                 continue
             near, far = (low, high) if abs(low - at) <= abs(high - at) else (high, low)
             if low < at < high and self._leads_on(nodes, ways, near):
@@ -148,12 +142,14 @@ class SweepPlanner:
             for target in (near, far) if low < at < high else (far,):
                 ways.append(_Way(lane, at, target))
                 at = target
-        flown = [nodes.index(node) for node in run]
-        for end in (min(flown), max(flown)):
-            self._lead_over(nodes, ways, end)
-        self._lead_out(nodes, ways)
-        legs = [_leg(way.lane, way.passed(nodes)) for way in ways]
-        return (*legs[:-1], replace(legs[-1], last=True)) if legs else ()
+        return ways
+
+    def _hindrance(self, nodes: Sequence[str], lane: Lane) -> StopCause | None:
+        """What keeps a lane from being flown past, wherever the drone is; None: nothing."""
+        low, high = _reach(nodes, lane)
+        if lane.speed.stops_for is None and high - low + 1 < _LEAST_NODES:
+            return StopCause.NODES
+        return lane.speed.stops_for
 
     def _lead_over(self, nodes: Sequence[str], ways: list[_Way], end: int) -> None:
         """Fly one of the ways on over this node, beyond what is counted, sooner than visit it afterwards: the
@@ -220,16 +216,17 @@ class SweepPlanner:
             singles = [[self._site.locations[code]] for code in view.locations]
             views += [view] if whole else [v for one in singles for v in self._views.column(at.id, one)]
         lanes = []
-        for view in views:
+        for view in _merged(views):
             levels = tuple(self._site.locations[code].level for code in view.locations)
             on = tuple(place for place in places if place.level in levels)
             distance_m = abs(on[0].y_m - at.y_m)
             cells = (self._assigner.cells[place.code] for place in on)
+            legibility = self._optics.view.legibility(self._views.nearest_m(distance_m))
             shelf = Shelf(distance_m, max(cell.x1_m - cell.x0_m for cell in cells))
             lanes.append(
                 Lane(
                     at.aisle, on[0].side, levels, view.height_m, view.yaw_rad, distance_m,
-                    sweep_speed(shelf, self._optics), on,
+                    sweep_speed(shelf, self._optics), on, legibility,
                 )
             )  # fmt: skip
         return lanes
@@ -258,6 +255,25 @@ class SweepPlanner:
         one, other = site.nodes[nodes[low]], site.nodes[nodes[high]]
         h = lane.height_m
         return straight and site.is_clear((one.x_m, one.y_m, h), (other.x_m, other.y_m, h))
+
+
+def _reach(nodes: Sequence[str], lane: Lane) -> tuple[int, int]:
+    """The first and the last of the nodes that face its places."""
+    faced = [nodes.index(place.node) for place in lane.places]
+    return min(faced), max(faced)
+
+
+def _merged(views: Sequence[View]) -> list[View]:
+    """Those of one column, from the lowest up, that are looked at from one height taken as one: limits of the
+    height may leave different levels the same."""
+    merged: list[View] = []
+    for view in views:
+        below = merged[-1] if merged else None
+        if below is not None and abs(view.height_m - below.height_m) < _APART_M:
+            merged[-1] = replace(below, locations=below.locations + view.locations)
+        else:
+            merged.append(view)
+    return merged
 
 
 def _ordered(lanes: Sequence[Lane], yaw_rad: float, height_m: float) -> list[Lane]:

@@ -11,12 +11,11 @@ import math
 from dataclasses import dataclass
 
 from flightd.config.schema import Config
-from flightd.site.coverage import MAX_BLUR_MODULES, MIN_PX_PER_MODULE, FrontView
+from flightd.site.coverage import MAX_BLUR_MODULES, FrontView, Legibility
 
 _POSE_M = 0.04
 _POSE_RAD = math.radians(2.0)
 """How far off the picture may lie on the shelf: the drone's place, and its heading."""
-_SLACK = 1e-6
 
 
 class Limit(enum.StrEnum):
@@ -28,12 +27,17 @@ class Limit(enum.StrEnum):
     CONFIGURED = "configured"
 
 
-LIMIT_WORDS = {
-    Limit.BLUR: "the blur of a module at the shortest exposure that the light allows",
-    Limit.OVERLAP: "the frame rate: each place must be wholly in several pictures",
-    Limit.CRUISE: "mission.speed_mps",
-    Limit.CONFIGURED: "scan.sweep.speed_mps",
-}
+class StopCause(enum.StrEnum):
+    """Why places are counted by stopping, none of them in passing."""
+
+    LABELS = "labels"
+    """Their labels are too small in the picture."""
+    WIDTH = "width"
+    """A place is wider than the picture."""
+    LINE = "line"
+    """The line is not open both ways, or not clear at that height."""
+    NODES = "nodes"
+    """They are before too few nodes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +65,8 @@ class SweepOptics:
         """As configured: frames that the readers have no time for are none."""
         front, scan = config.front_camera, config.scan
         sweep = scan.sweep
-        fov_rad = 2.0 * math.atan(front.width_px / 2.0 / front.fx_px)
         return cls(
-            FrontView(fov_rad, front.width_px, front.exposure_s, sweep.module_m),
+            FrontView.of(front, sweep.module_m),
             sweep.least_exposure,
             min(front.fps, scan.workers / sweep.read_s),
             sweep.label_m,
@@ -77,10 +80,11 @@ class SweepOptics:
 class SweepSpeed:
     """The fastest flight past a shelf, and what comes of it.
 
-    `exposure` is a part of the camera's usual one, `window_m` the way on which a place is wholly in the
-    picture, `views` how many pictures that gives, `fps` how many frames a second are read and `needed_fps`
-    how many this speed needs; `limits_mps` what each limit alone allows, `limit` the lowest of them.
-    `readable`: the labels are large enough in the picture, and a place fits it."""
+    `exposure` is a part of the camera's usual one, `exposure_s` what that comes to.  `window_m` is the way on
+    which a place is wholly in the picture, `views` how many pictures that gives, `fps` how many frames are
+    read in a second and `needed_fps` how many this speed needs; `limits_mps` what each limit alone allows,
+    `limit` the lowest of them.  0 m/s where a place is wider than the picture.  `stops_for` is why it is not
+    flown past, None if it may be: the labels are large enough in the picture, and a place fits it."""
 
     speed_mps: float
     limit: Limit
@@ -92,7 +96,8 @@ class SweepSpeed:
     views: float
     fps: float
     needed_fps: float
-    readable: bool
+    exposure_s: float
+    stops_for: StopCause | None
 
 
 def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
@@ -113,6 +118,9 @@ def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
     # no darker than the speed asks for
     exposure = min(1.0, view.speed_limit_mps() / speed_mps) if speed_mps > 0.0 else 1.0
     px = view.px_per_module(shelf.distance_m)
+    stops_for = None if window_m > 0.0 else StopCause.WIDTH
+    if view.legibility(shelf.distance_m) is not Legibility.SURE:
+        stops_for = StopCause.LABELS
     return SweepSpeed(
         speed_mps=speed_mps,
         limit=limit,
@@ -123,6 +131,7 @@ def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
         window_m=max(window_m, 0.0),
         views=window_m * optics.fps / speed_mps if speed_mps > 0.0 else 0.0,
         fps=optics.fps,
-        needed_fps=optics.views * speed_mps / window_m if window_m > 0.0 else math.inf,
-        readable=px >= MIN_PX_PER_MODULE * (1.0 - _SLACK) and window_m > 0.0,
+        needed_fps=optics.views * speed_mps / window_m if window_m > 0.0 else 0.0,
+        exposure_s=exposure * view.exposure_s,
+        stops_for=stops_for,
     )

@@ -24,10 +24,11 @@ _GONE_NS = 1_500_000_000
 
 
 class SweepTask:
-    """Call `begin` where legs are flown, `take` with what the pictures show, `step` at each tick, `end` after
-    the last leg.  `drain` gives what was decided since.
+    """Call `begin` where legs are flown, `fly` with each leg in its turn, `take` with what the pictures show,
+    `step` at each tick, `end` after the last leg.  `drain` gives what was decided since.
 
-    A picture counts for the leg from whose height, and facing whose side, it was taken."""
+    A picture counts for the leg from whose height, and facing whose side, it was taken; where several are so
+    near to each other, for the one that was flown then."""
 
     def __init__(
         self,
@@ -51,6 +52,8 @@ class SweepTask:
         self._apart: set[tuple[str, str, str]] = set()
         self._glimpsed: dict[str, int] = {}
         self._since_ns: int | None = None
+        self._turns: list[tuple[int, SweepLeg]] = []
+        """From when on each leg was flown, in the order in which they were."""
         self.undecided: dict[str, Undecided] = {}
         """Places that were flown past and not decided, and why."""
 
@@ -63,6 +66,11 @@ class SweepTask:
         """Legs are flown, or flown on after an interruption: pictures exposed from now on count."""
         if self._since_ns is None:
             self._since_ns = now_ns
+
+    def fly(self, now_ns: int, leg: SweepLeg) -> None:
+        """This leg is flown to, or along, from now on."""
+        if not self._turns or self._turns[-1][1] != leg:
+            self._turns.append((now_ns, leg))
 
     def pause(self) -> None:
         """The leg is interrupted: no picture counts until it goes on."""
@@ -80,10 +88,16 @@ class SweepTask:
         """The leg that a picture taken at `pose` counts for."""
         if self._since_ns is None or pose.stamp_ns < self._since_ns:
             return None
-        facing = [leg for leg in self._legs if abs(wrap_pi(pose.yaw_rad - leg.yaw_rad)) < _FACES_RAD]
-        nearest = min(facing, key=lambda leg: abs(leg.height_m - pose.height_m), default=None)
-        off_m = math.inf if nearest is None else abs(nearest.height_m - pose.height_m)
-        return nearest if off_m < _AT_HEIGHT_M else None
+        near = [
+            leg
+            for leg in self._legs
+            if abs(wrap_pi(pose.yaw_rad - leg.yaw_rad)) < _FACES_RAD
+            and abs(leg.height_m - pose.height_m) < _AT_HEIGHT_M
+        ]
+        flown = next((leg for from_ns, leg in reversed(self._turns) if from_ns <= pose.stamp_ns), None)
+        if flown in near:
+            return flown
+        return min(near, key=lambda leg: abs(leg.height_m - pose.height_m), default=None)
 
     def near(self, pose: BodyPose) -> tuple[str, ...]:
         """The locations that a picture taken at `pose` is wanted of: what is not decided."""
@@ -138,6 +152,11 @@ class SweepTask:
         """The locations decided since the last call."""
         found, self._findings = tuple(self._findings), []
         return found
+
+    @property
+    def evidence(self) -> tuple[str, ...]:
+        """The best pictures of what is not decided yet."""
+        return tuple(votes.evidence for votes in self._votes.values())
 
     @property
     def why(self) -> Counter[Undecided]:

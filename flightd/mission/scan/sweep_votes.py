@@ -95,6 +95,11 @@ class SweepVotes:
         self._together.update(combinations(believed, 2))
         self._votes.add(frame_seq, pose, place, reads)
 
+    @property
+    def evidence(self) -> str:
+        """The name of the best picture of it so far; empty where there is none."""
+        return self._votes.evidence
+
     def verdict(self, others: Collection[str] = ()) -> Finding | Undecided:
         """What the views say together, asked when the place is out of the picture; `others` are the codes
         that surely belong elsewhere."""

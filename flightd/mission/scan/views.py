@@ -15,6 +15,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import BodyPose, Light
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
+from flightd.mission.scan.legibility import nearest_look_m
 from flightd.site.shelf_cells import by_node
 from flightd.site.site import Location, Side, Site
 
@@ -84,6 +85,10 @@ class ViewPlanner:
         """The codes of all locations that are counted from a node."""
         return tuple(location.code for location in self._by_node.get(node, ()))
 
+    def nearest_m(self, distance_m: float) -> float:
+        """How near to a shelf at that distance from the aisle's line it is looked at from."""
+        return nearest_look_m(distance_m, self._params)
+
     def views(self, node: str, wanted: frozenset[str], height_m: float, yaw_rad: float) -> list[View]:
         """The views of the `wanted` locations of a node, in the order of least turning and climbing for a
         drone that hovers there at `height_m`, heading `yaw_rad`: up one side, down the other."""
@@ -122,10 +127,10 @@ class ViewPlanner:
         label_m = math.fsum(place.height_m for place in places) / len(places)
         shelf_m = places[0].y_m
         towards = math.copysign(1.0, shelf_m - node.y_m)
-        room_m = max(0.0, abs(shelf_m - node.y_m) - p.clearance_m)
+        distance_m = abs(shelf_m - node.y_m)
         near = number < len(hands)
-        step_m = min(p.step_m, room_m) if near else -p.step_m / 2
-        height_m = self._height(label_m, abs(shelf_m - node.y_m) - step_m)
+        step_m = distance_m - nearest_look_m(distance_m, p) if near else -p.step_m / 2
+        height_m = self._height(label_m, distance_m - step_m)
         most_m = min(p.aside_m, self._aside_per_height * height_m)
         aside_m = _clamp(middle_m - node.x_m + (0.0 if near else p.step_m), most_m)
         first, *_, last = self._site.aisle_nodes(view.aisle)

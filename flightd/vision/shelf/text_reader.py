@@ -7,6 +7,7 @@ Needs the extra `ocr`; nothing of it is imported before the first picture.
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flightd.core.errors import UnavailableError
 from flightd.core.extras import missing_extra
 from flightd.core.geometry import Matrix
 from flightd.core.label_text import TextLine, TextLook
@@ -40,6 +42,13 @@ _LOST_END_PX: Final = 10
 _LOST_PX: Final = 12
 """So many columns in a row, at an end or within, that have nothing darker (grey levels, noise smoothed) are
 where glare may have taken characters."""
+
+
+def needs_extra() -> UnavailableError | None:
+    """Why printed text is not read on this machine, if it is not."""
+    if importlib.util.find_spec("rapidocr") and importlib.util.find_spec("onnxruntime"):
+        return None
+    return missing_extra("ocr", "[[scan.text]]: printed text is not read, it")
 
 
 class TextReader:

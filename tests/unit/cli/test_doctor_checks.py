@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,9 @@ from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.parameter_rule import judge as judge_parameter
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for
 from flightd.adapters.vehicle.range_finders import RangeSample
+from flightd.app.build import pilot_of
+from flightd.app.computer_check import look_here
+from flightd.cli.planned_flight import planned_in_words
 from flightd.config.camera import CameraConfig
 from flightd.config.recorder import RecorderConfig
 from flightd.config.schema import Config, load_config
@@ -21,10 +25,13 @@ from flightd.config.vehicle import VehicleConfig
 from flightd.doctor.calibration import check_calibration
 from flightd.doctor.camera import Pictures, check_latency, check_vision, judge_camera
 from flightd.doctor.check import Check, CheckLevel
+from flightd.doctor.label_text import check_text
+from flightd.doctor.labels import check_labels
 from flightd.doctor.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
 from flightd.doctor.vehicle import judge as judge_vehicle
 from flightd.site.site_file import load_site
 from flightd.vision.line_detector import Detector
+from tests.unit.mission.shelves import FITTED
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
@@ -211,3 +218,48 @@ def test_a_low_voltage_for_three_cells_does_not_pass_on_four(volts: float, cells
     ]
     (rule,) = rules
     assert (judge_parameter(rule, ("BATT_LOW_VOLT", volts)) is None) is fits
+
+
+@pytest.mark.parametrize(
+    ("module_m", "mode", "says"),
+    [
+        (0.003, "sweep", ""),
+        (0.0025, "sweep", ""),  # a stop looks from nearer
+        (0.0022, "sweep", "48 places: labels are not surely read"),
+        (0.0005, "sweep", "48 places: labels cannot be read"),
+        (0.0005, "stop", "48 places: labels cannot be read"),
+    ],
+)
+def test_labels_that_are_too_small_to_be_read_are_told_before_the_flight_and_in_its_plan(
+    module_m: float, mode: str, says: str
+) -> None:
+    site = load_site(CONFIGS / "site-racks-small.toml")
+    scan = {"mode": mode, "sweep": {"module_m": module_m}}
+    params = config().with_values(front_camera=FITTED, scan=scan)
+    checks = check_labels(params, site)
+    assert [check.text for check in checks] == [says] * bool(says)
+    assert set(levels(checks)) <= {CheckLevel.WARNING}, "other states are counted"
+    assert checks == [check for check in look_here(params, site) if check.name == "labels"]
+    planned = pilot_of(params, site).mission.planned((), (), best_order=False)
+    words = planned_in_words(planned)
+    assert (planned.unread is not None) is bool(says)
+    if planned.unread is not None:
+        assert f"48 places counted, the labels of {planned.unread.places} too small" in words[1]
+        assert words[2].startswith(
+            f"{says}; labels get {module_m * 1e3 / 1.2:.2f} px per module, 2.5 are needed"
+        )
+        assert "or take a longer lens or larger labels" in words[2]
+        assert all(says.split(": ")[1] in each.text for each in planned.sweeps)
+    assert not check_labels(config(), site), "it counts nothing"
+
+
+def test_printed_text_that_nothing_is_there_to_read_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = {"text": [{"kind": "lot", "pattern": "LOT (.*)"}]}
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert check_text(config()) == []
+    checks = check_text(config().with_values(scan=text))
+    assert levels(checks) == [CheckLevel.WARNING]
+    assert "[[scan.text]]: printed text is not read" in checks[0].text
+    assert "-m pip install" in checks[0].remedy
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
+    assert check_text(config().with_values(scan=text)) == []

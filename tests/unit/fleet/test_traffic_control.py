@@ -9,7 +9,7 @@ from flightd.fleet.traffic.lanes import LaneGraph
 from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action
 from flightd.fleet.traffic.traffic_control import HORIZON_MS, TrafficControl
-from tests.unit.fleet.traffic_rig import CELL, PACE, SmallHall, gap
+from tests.unit.fleet.traffic_rig import CELL, PACE, SmallHall, check_air, gap
 
 
 class Floor:
@@ -50,13 +50,7 @@ class Floor:
         return moved
 
     def check(self) -> None:
-        """No two drones have air that meets, released or taken."""
-        for a, one in self.control.drones.items():
-            for b, two in self.control.drones.items():
-                for r in one.wreck or one.air if a < b else ():
-                    for q in two.wreck or two.air:
-                        across_m, upright_m = gap(self.lanes, r, q)
-                        assert across_m >= CELL.separation_m - 1e-6 or upright_m >= CELL.upright_m - 1e-6
+        check_air(self.control)
 
     def run(self, steps: int = 400) -> None:
         for _ in range(steps):

@@ -19,7 +19,6 @@ from flightd.fleet.traffic.action_graph import (
 from flightd.fleet.traffic.cells import CellSize, conflicts_of
 from flightd.fleet.traffic.lanes import lanes_of
 from flightd.fleet.traffic.motions import Act, MotionNet, at_rest, vertex_of
-from flightd.fleet.traffic.pibt import Pushed, plan_by_pushing
 from flightd.fleet.traffic.plan import Action
 from flightd.fleet.traffic.prioritised import PrioritisedPlanner
 from flightd.fleet.traffic.tours import Request
@@ -141,21 +140,6 @@ def test_a_circle_of_actions_is_a_deadlock_and_refused() -> None:
     two = [Action(Act.FLY, lane, hall.lanes.over("B4"), 0, 5, 10)]
     with pytest.raises(CyclicDependenciesError, match="a, b wait for each other"):
         ActionGraph({"a": Course(0, 0, one), "b": Course(0, 0, two)}, hall.conflicts)
-
-
-def test_priority_inheritance_pushes_drones_out_of_each_others_way() -> None:
-    """Head to head in one aisle, each on its way to the pad behind the other."""
-    hall = SMALL(2, 4, 2)
-    left, right = hall.lanes.pads
-    a, b = hall.lanes.over("A2"), hall.lanes.over("A4")
-    drones = [Pushed("a", at_rest(a, 0), 0, right), Pushed("b", at_rest(b, 0), 0, left)]
-    plans = plan_by_pushing(hall.net, hall.conflicts, hall.planner.distances, drones)
-    assert plans is not None
-    assert plans["a"].actions[-1].vertex == right
-    assert plans["b"].actions[-1].vertex == left
-    courses = {"a": (a, plans["a"].actions), "b": (b, plans["b"].actions)}
-    assert not shared_cells(hall.lanes, courses)
-    ActionGraph({d: Course(place, 0, actions) for d, (place, actions) in courses.items()}, hall.conflicts)
 
 
 def test_a_straight_flight_takes_what_the_pace_says() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import random
 from collections.abc import Mapping, Sequence
 
 from flightd.fleet.traffic.cells import CellSize, Conflicts, conflicts_of
@@ -11,6 +12,7 @@ from flightd.fleet.traffic.motions import MotionNet, at_rest
 from flightd.fleet.traffic.plan import Action, Stop
 from flightd.fleet.traffic.prioritised import PrioritisedPlanner
 from flightd.fleet.traffic.tours import Request
+from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.mission.plan.leg_times import Pace
 from flightd.sim.fleet.hall import fleet_hall
 
@@ -73,3 +75,41 @@ def _taken(place: int, actions: Sequence[Action]) -> list[tuple[int, int, int]]:
         spells += [(at, since_ms, action.start_ms), (action.resource, action.start_ms, action.end_ms)]
         at, since_ms = action.vertex, action.end_ms
     return [*spells, (at, since_ms, 1 << 62)]
+
+
+def check_air(control: TrafficControl) -> None:
+    """No two drones have air that meets, released or taken."""
+    for one, two in itertools.combinations(control.drones.values(), 2):
+        for r in one.wreck or one.air:
+            for q in two.wreck or two.air:
+                across_m, upright_m = gap(control.lanes, r, q)
+                assert across_m >= CELL.separation_m - 1e-6 or upright_m >= CELL.upright_m - 1e-6
+
+
+def fly_out(control: TrafficControl, seed: int = 0) -> dict[str, int]:
+    """Where all are when nobody has anything ahead that it may do: done in any order, and nobody meets."""
+    rng = random.Random(seed)
+    for now_ms in itertools.count(step=1000):
+        control.release(now_ms)
+        check_air(control)
+        ready = [drone for drone, course in control.drones.items() if course.base]
+        if not ready:
+            break
+        drone = rng.choice(ready)
+        control.done(drone, control.drones[drone].done + 1, now_ms)
+    return {drone: course.place for drone, course in control.drones.items()}
+
+
+def fly_at_pace(control: TrafficControl, anew: Sequence[str], every_ms: int) -> dict[str, int]:
+    """The same at the pace that is planned, some being planned `anew` again and again."""
+    for now_ms in range(0, 2_000_000, 1000):
+        if now_ms % every_ms == 0:
+            control.replan(anew, now_ms)
+        control.release(now_ms)
+        check_air(control)
+        for drone, course in control.drones.items():
+            if course.base and now_ms >= course.since_ms + course.base[0].duration_ms:
+                control.done(drone, course.done + 1, now_ms)
+        if not any(course.ahead for course in control.drones.values()):
+            return {drone: course.place for drone, course in control.drones.items()}
+    raise AssertionError("they never come to rest")

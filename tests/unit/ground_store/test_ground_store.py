@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -256,20 +257,63 @@ def test_sites_do_not_mix(store: GroundStore) -> None:
     assert [row["reads"][0]["text"] for row in store.history(SITE, "A-1")] == ["here"]
 
 
-def test_flights_decisions_people_and_audit_are_taken_once(store: GroundStore) -> None:
+def rows_of(opened: Engine, question: str) -> list[tuple[Any, ...]]:
+    """What a database says, read past the store."""
+    try:
+        with opened.reading() as session:
+            return [tuple(row) for row in session.rows(question)]
+    finally:
+        opened.close()
+
+
+def test_flights_decisions_people_and_audit_are_taken_once(
+    store: GroundStore, engine: Callable[[], Engine]
+) -> None:
     flight = SentFlight("ab" * 32, "north", _BEGIN, 61.5, "every node", "flying", "", "", 12, None)
     over = SentFlight("ab" * 32, "north", _BEGIN, 90.0, "every node", "completed", "", "good", 12, 12)
     decided = SentDecision("decision-1", "A-1", _BEGIN, 0, "put_right", "ann", "label was torn")
-    line = SentLine(_BEGIN, "ann", "start", "north", "accepted", '{"time": "…"}')
-    people = (SentPerson("ann", "operator", _BEGIN),)
-    for flown in (flight, over, over):
-        store.take(
-            Batch(SITE, "station", flights=(flown,), decisions=(decided,), people=people, audit=(line,))
-        )
+    lines = [
+        SentLine(_BEGIN + n, "ann", "start", "north", "accepted", f'{{"time": "…", "n": {n}}}')
+        for n in range(2)
+    ]
+    for n, flown in enumerate((flight, over, over)):
+        people = (SentPerson("ann", ("observer", "operator", "operator")[n], _BEGIN + min(n, 1)),)
+        audit = tuple(lines[: n + 1])
+        store.take(Batch(SITE, "station", flights=(flown,), decisions=(decided,), people=people, audit=audit))
+    store.take(Batch(SITE, "other", people=(SentPerson("ann", "admin", _BEGIN),)))
     (row,) = store.flights(SITE)
     assert (row["outcome"], row["duration_s"], row["nodes_visited"]) == ("completed", 90.0, 12)
     assert [one["who"] for one in store.decisions(SITE, "A-1")] == ["ann"]
     assert store.counts()["flights"] == 1
+    assert rows_of(engine(), "SELECT station, name, role, seen_ns FROM person ORDER BY station") == [
+        ("other", "ann", "admin", _BEGIN), ("station", "ann", "operator", _BEGIN + 1),
+    ]  # fmt: skip
+    told = "SELECT station, utc_ns, person, act, target, outcome, line FROM audit ORDER BY utc_ns"
+    assert rows_of(engine(), told) == [
+        ("station", line.utc_ns, "ann", "start", "north", "accepted", line.line) for line in lines
+    ]
+
+
+@pytest.mark.parametrize("engine", ["postgres"], indirect=True)
+def test_looks_lie_in_the_partition_of_their_month(store: GroundStore, engine: Callable[[], Engine]) -> None:
+    november_ns = int(datetime(2025, 11, 1, tzinfo=UTC).timestamp()) * _NS
+    times = (november_ns - 1, november_ns, november_ns + _DAY, 5, (1 << 63) - 1)
+    for n, at_ns in enumerate(times):
+        store.take(batch(look(f"A-{n}", at_ns=at_ns)))
+    where = rows_of(
+        engine(),
+        "SELECT place.code, observation.tableoid::regclass::text FROM observation"
+        " JOIN place ON place.id = observation.place ORDER BY place.code",
+    )
+    assert where == [
+        ("A-0", "observation_2025_10"), ("A-1", "observation_2025_11"), ("A-2", "observation_2025_11"),
+        ("A-3", "observation_before_2020"), ("A-4", "observation_beyond"),
+    ]  # fmt: skip
+    bounds = f"utc_ns >= {november_ns} AND utc_ns < {november_ns + _DAY}"
+    plan = rows_of(engine(), f"EXPLAIN SELECT id FROM observation WHERE {bounds}")
+    asked = " ".join(str(line) for (line,) in plan)
+    assert "observation_2025_11" in asked
+    assert not {"observation_2025_10", "observation_beyond"} & set(asked.split())
 
 
 def test_times_of_clocks_far_off_are_kept(store: GroundStore) -> None:

@@ -10,8 +10,9 @@ import pytest
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.ground_store.open_store import opened_store
 from flightd.ground.shared_folder import PASSWORD, SharedFolder
+from tests.rigs.extras import of_extra
 
-pytest.importorskip("paramiko", reason="folders over SFTP need it: pip install -e '.[exchange]'")
+of_extra("paramiko", "exchange")
 
 
 @pytest.fixture

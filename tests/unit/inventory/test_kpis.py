@@ -49,6 +49,12 @@ def test_a_run_has_its_pace_without_the_breaks_and_its_retakes() -> None:
     assert run_figures(counts(seen("A", 1)))[0].locations_per_hour is None
 
 
+def test_what_was_flown_past_and_left_open_was_looked_at_again_by_its_one_look_at_a_stop() -> None:
+    looks = [replace(seen(f"A-{n}", 10 * n, "X"), again=n < 3) for n in range(10)]
+    (run,) = run_figures(counts(*looks))
+    assert (run.looked_again, run.retake_share) == (3, 0.3)
+
+
 def test_runs_stand_in_the_order_of_their_last_looks() -> None:
     looks = counts(seen("A", 5, run="late"), seen("A", 2, run="early"), seen("B", 1, run="late"))
     assert [run.run for run in run_figures(looks)] == ["early", "late"]

@@ -19,6 +19,7 @@ from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.replay.log import read_log
 from tests.command import Command
 from tests.replay.synthetic_flight import write_flight
+from tests.rigs.extras import of_extra
 from tests.unit.log_study.dying_work import always_dies, dies_once
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -121,7 +122,7 @@ def test_a_worker_that_dies_costs_time_alone(flights: Path, alone: str, tmp_path
 def test_ray_finds_the_same_byte_for_byte_though_a_worker_is_killed(
     flights: Path, alone: str, tmp_path: Path
 ) -> None:
-    pytest.importorskip("ray", reason="the tests of --engine ray need it: pip install -e '.[ray]'")
+    of_extra("ray", "ray")
     shutil.copytree(flights, tmp_path / "flights")
     sources = log_sources([str(tmp_path / "flights")])
     right = alone.replace(str(flights), str(tmp_path / "flights"))
@@ -136,6 +137,39 @@ def test_logs_are_fetched_from_wherever_fsspec_finds_them(flights: Path) -> None
     near, far = study_source(here[0], STUDIES), study_source(there[0], STUDIES)
     assert near.findings == far.findings
     assert near.findings[Study.DETECT].outcome is not Outcome.FAILED
+
+
+def test_of_a_folder_of_many_logs_only_what_belongs_to_one_is_fetched(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from fsspec.implementations.memory import MemoryFileSystem
+
+    files, read = MemoryFileSystem(), list[str]()
+    beside = {"summary.json", "truth.mcap", "inventory.db", "inventory.db-wal", "evidence/ab/abcd.jpg"}
+    opened = MemoryFileSystem.open
+
+    def noted(self: Any, path: str, mode: str = "rb", **how: Any) -> Any:
+        read.extend([path] if mode == "rb" else [])
+        return opened(self, path, mode, **how)
+
+    logs = {f"{n} [north].mcap" for n in range(5)}
+    for name in (*logs, *beside, "notes.txt", "a/flight.mcap", "a/summary.json"):
+        files.pipe_file(f"/flat/{name}", f"what is in {name}".encode())
+    monkeypatch.setattr(MemoryFileSystem, "open", noted)
+    try:
+        sources = log_sources(["memory://flat"])
+        assert len(sources) == 6
+        assert read == []
+        for source in sources:
+            read.clear()
+            with source.fetched() as log:
+                here = {str(path.relative_to(log.parent)) for path in log.parent.rglob("*") if path.is_file()}
+                assert log.read_text() == "what is in " + source.place.removeprefix("memory:///flat/")
+            alone = {"flight.mcap", "summary.json"}
+            assert here == (alone if source.place.endswith("/a/flight.mcap") else {log.name, *beside})
+            assert len(read) == len(here)
+    finally:
+        files.rm("/flat", recursive=True)
 
 
 @pytest.mark.parametrize(

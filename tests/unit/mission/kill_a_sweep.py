@@ -4,11 +4,13 @@
 
 The mission, the scanner, the writer and the file are the real ones; the drone is fed by hand and the pictures
 are those of an ideal reader.  Each process is killed (SIGKILL) after a random number of writes that it told,
-or before the first.  A count that is complete is followed by another, under a new name.
+or before the first.  A count that is complete is followed by another, under a new name.  One pallet is at
+two places.
 
 Prints one JSON document: kills, writes that were told before a kill, how many of those were lost, places with
-more than one look that counts, looks at what counted already, files that did not open sound, counts that were
-completed.  Killing uses fork, so this is a program of its own.
+more than one look that counts, looks at what counted already, bookings that were contradicted, those of them
+that count still, files that did not open sound, counts that were completed.  Killing uses fork, so this is a
+program of its own.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ from tests.unit.mission.test_sweep_flight import Sweep, labels_of
 _CHUNK_S = 0.2
 _WRITING_S = 0.02
 _MOST_WRITES = 64
+_TWICE = ("AL-02-2-2", "AR-04-1-1")
 
 
 class ToldStore(SqliteStore):
@@ -50,7 +53,7 @@ class ToldStore(SqliteStore):
 
     def commit(self, observation: Observation, confirmed: bool = True) -> None:
         super().commit(observation, confirmed)
-        os.write(self._told, f"seen {observation.id}\n".encode())
+        os.write(self._told, f"seen {observation.id} {observation.run} {observation.location}\n".encode())
 
     def settle(self, run: str, locations: Iterable[str], confirmed: bool) -> None:
         codes = tuple(locations)
@@ -58,13 +61,19 @@ class ToldStore(SqliteStore):
         if confirmed:
             os.write(self._told, "".join(f"sure {run} {code}\n" for code in codes).encode())
 
+    def contradict(self, run: str, locations: Iterable[str]) -> None:
+        codes = tuple(locations)
+        super().contradict(run, codes)
+        os.write(self._told, "".join(f"taken {run} {code}\n" for code in codes).encode())
+
 
 async def _count(store: SqliteStore, run: str) -> None:
     """Fly what is left of a count, as a flight that goes on with it does."""
     store.plan(PlannedLocation(place.code, place.node) for place in SITE.locations.values())
     store.withdraw_pending(run)
     # labels of the places themselves prove where it is, so that a part is booked on the way
-    labels = {code: [*found, Label(code, -0.15)] for code, found in labels_of(SITE).items()}
+    stock = labels_of(SITE) | {code: [Label("PALLET 9")] for code in _TWICE}
+    labels = {code: [*found, Label(code, -0.15)] for code, found in stock.items()}
     flight = Sweep(stock=Stock(labels))
     flight.scanner.skip(store.counted(run))
     clock = LoopClock()
@@ -113,9 +122,10 @@ def main() -> None:
     kills, seed, folder = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])
     rng = random.Random(seed)
     SqliteStore(folder).close()
-    seen: set[str] = set()
+    seen: dict[str, tuple[str, str]] = {}
     sure: set[tuple[str, str]] = set()
-    killed = lost = double = again = unsound = 0
+    taken: set[str] = set()
+    killed = lost = double = again = contradicted = stood = unsound = 0
     run = 1
     while killed < kills:
         name = f"count-{run}"
@@ -126,16 +136,26 @@ def main() -> None:
         killed += was_killed
         for line in lines:
             kind, *what = line.split(" ")
+            of, code = what[-2:]
             if kind == "seen":
-                seen.add(what[0])
+                seen[what[0]] = of, code
+            elif kind == "sure":
+                sure.add((of, code))
             else:
-                sure.add((what[0], what[1]))
+                contradicted += (of, code) in sure
+                sure.discard((of, code))
+                taken |= {id_ for id_, at in seen.items() if at == (of, code)}
         database = sqlite3.connect(folder / "inventory.db")
         held = list(database.execute("SELECT id, run, location, standing FROM observation"))
         unsound += database.execute("PRAGMA integrity_check").fetchone() != ("ok",)
         database.close()
         booked = Counter((of, code) for _, of, code, standing in held if standing == 1)
-        lost += len(seen - {row[0] for row in held}) + len(sure - booked.keys())
+        # killed between taking a booking back and telling so
+        sure -= {
+            (of, code) for _, of, code, standing in held if standing == 2 and code in _TWICE
+        } - booked.keys()
+        lost += len(seen.keys() - {row[0] for row in held}) + len(sure - booked.keys())
+        stood = len(taken & {id_ for id_, *_, standing in held if standing == 1})
         double += sum(count > 1 for count in booked.values())
         again += sum(of == name and code in counted and id_ not in before for id_, of, code, _ in held)
         run += all((name, code) in booked for code in SITE.locations)
@@ -143,7 +163,8 @@ def main() -> None:
         json.dumps(
             {
                 "kills": killed, "writes": len(seen) + len(sure), "lost": lost, "double": double,
-                "again": again, "unsound": unsound, "completed": run - 1,
+                "again": again, "contradicted": contradicted, "stood": stood, "unsound": unsound,
+                "completed": run - 1,
             }
         )
     )  # fmt: skip

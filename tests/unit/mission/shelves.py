@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from flightd.config.front_camera import FrontCameraConfig
 from flightd.core.scanning import BodyPose, CodeSet, Light, Occupancy, PlaceLook
 from flightd.core.types import CodeRead
 from flightd.mission.scan.code_assignment import FrontSight
+from flightd.site.site import Site
 from flightd.site.site_file import parse_site
 
 _RACKS_AND_PAD = """
@@ -19,8 +22,11 @@ id = "home"
 node = "A1"
 size_m = 0.5
 """
-SITE = parse_site(
-    """
+
+
+def one_aisle(levels_m: Sequence[float] = (0.9, 1.8), bay_m: float = 1.3, positions: int = 2) -> Site:
+    """Four nodes with racks on both sides."""
+    text = f"""
 [site]
 name = "shelves"
 ceiling_m = 6.0
@@ -30,11 +36,22 @@ id = "A"
 x_m = 0.0
 y_m = 0.0
 spacing_m = [1.3, 1.3, 1.3]
-shelf_height_m = 2.4
+shelf_height_m = {max(levels_m) + 0.6}
+
+[[rack]]
+bay_width_m = {bay_m}
+levels_m = {list(levels_m)}
+positions = {positions}
+
+[[pad]]
+id = "home"
+node = "A1"
+size_m = 0.5
 """
-    + _RACKS_AND_PAD,
-    "shelves",
-)
+    return parse_site(text, "shelves")
+
+
+SITE = one_aisle()
 _SPACING = "[1.3, 1.3, 1.3, 1.3]"
 BARE_ENDS = parse_site(
     """

@@ -44,6 +44,19 @@ def test_every_state_is_told_and_each_location_has_exactly_one() -> None:
     assert hover.found[one].evidence.endswith(one)
 
 
+def test_the_best_picture_of_each_place_is_named_until_its_finding_has_gone_out() -> None:
+    hover = Hover()
+    hover.at_view()
+    one = LOCATIONS[0]
+    hover.look({one: Occupancy.GOODS})
+    hover.look({one: Occupancy.UNSURE}, share=0.7)
+    assert hover.scanner.evidence - {""} == {f"1:{one}"}
+    for _ in range(4):
+        hover.look({one: Occupancy.GOODS}, {one: ("P1",)})
+    assert hover.found[one].evidence
+    assert not hover.scanner.evidence - {""}
+
+
 def test_what_no_picture_showed_is_not_visited() -> None:
     hover = Hover()
     hover.run({}, {})

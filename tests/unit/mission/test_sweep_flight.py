@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -25,9 +26,10 @@ from flightd.mission.scan.scanner import Scanner
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.site.site import Site
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
+from tests.unit.mission import shelves
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
-from tests.unit.mission.shelves import BARE_ENDS, FITTED, SIGHT, SITE
+from tests.unit.mission.shelves import BARE_ENDS, FITTED, SIGHT, SITE, one_aisle
 from tools.sweep_time import spent
 
 PLACES = tuple(SITE.locations)
@@ -173,11 +175,15 @@ def test_what_views_leave_open_is_visited_by_stopping_in_the_best_order() -> Non
     assert set(flight.states) == set(PLACES)
     assert {flight.states[code] for code in burnt} == {LocationState.UNREADABLE}
     assert {flight.states[code] for code in twice} == {LocationState.READ}
-    assert flight.said("contradiction") == ["one code at AL-02-2-2 and AR-04-1-1: both are looked at again"]
+    assert flight.said("contradiction") == [
+        "one code at AL-02-2-2 and AR-04-1-1: to be looked at again",
+        "one code at AL-02-2-2 and AR-04-1-1: counted at each",
+    ]
     found = [finding.location for finding in flight.findings]
-    assert [found.count(code) for code in sorted(twice)] == [2, 1], "the first in passing, too"
-    withdrawn = {code for one in flight.settled if not one.confirmed for code in one.locations}
-    assert withdrawn <= {"AL-02-2-2"}
+    assert [found.count(code) for code in sorted(twice)] == [2, 2], "in passing, and at a stop"
+    assert {finding.location for finding in flight.findings if finding.again} == burnt | twice
+    withdrawn = [code for one in flight.settled if not one.confirmed for code in one.locations]
+    assert sorted(withdrawn) == sorted(twice)
     # it ends its legs over A1, where the pad is: there is no way but out and back
     assert "A2, A4 to stop at" in flight.said("sweep")
     assert flight.scanned == {"A2", "A4"}
@@ -190,6 +196,72 @@ def test_what_views_leave_open_is_visited_by_stopping_in_the_best_order() -> Non
     assert "nodes that are not flown past" not in times
 
 
+def test_what_is_booked_is_withdrawn_at_once_where_its_code_is_found_elsewhere() -> None:
+    """Location labels prove each place in passing; the flight ends before both are looked at again."""
+    one, other = "AL-02-2-2", "AR-04-1-1"
+    labels = labels_of(SITE) | {code: [Label("PALLET 1")] for code in (one, other)}
+    stock = Stock({code: [*found, Label(code, -0.15)] for code, found in labels.items()})
+    flight = Sweep(stock=stock)
+    flight.fly(until=lambda: bool(flight.said("contradiction")))
+    booked = booked_of(flight)
+    assert len(booked) > 4
+    assert not {one, other} & set(booked)
+
+
+def booked_of(flight: Sweep) -> list[str]:
+    """What is proven and not withdrawn, once for each time."""
+    booked: list[str] = []
+    for settled in flight.settled:
+        if settled.confirmed:
+            booked += settled.locations
+        elif settled.booked:
+            booked = [code for code in booked if code not in settled.locations]
+    return booked
+
+
+@pytest.mark.parametrize("mode", ScanMode)
+def test_one_pallet_at_two_places_is_counted_at_neither_before_both_are_looked_at_again(
+    mode: ScanMode,
+) -> None:
+    """Whichever way they are counted, and in whichever aisle."""
+    one, other = "AL-02-2-2", "CR-04-1-1"
+    labels = labels_of(BARE_ENDS) | {code: [Label("PALLET 9")] for code in (one, other)}
+    flight = Sweep(config().with_values(scan={"mode": mode}), Stock(labels), BARE_ENDS)
+    flight.fly(900.0, until=lambda: bool(flight.said("contradiction")))
+    assert not {one, other} & set(booked_of(flight))
+    flight.fly(900.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert flight.said("contradiction") == [
+        f"one code at {one} and {other}: to be looked at again",
+        *(f"one code at {a} and {b}: counted at each" for a, b in [flight_order(flight, one, other)]),
+    ]
+    assert flight.states == dict.fromkeys(BARE_ENDS.locations, LocationState.READ)
+    assert sorted(booked_of(flight)) == sorted(BARE_ENDS.locations)
+    found = Counter(finding.location for finding in flight.findings)
+    assert {code for code, count in found.items() if count > 1} == {one, other}
+    assert len(flight.mission.visited) == flight.mission.plan.visits
+
+
+def flight_order(flight: Sweep, *places: str) -> list[str]:
+    """These places in the order of their last looks."""
+    found = [finding.location for finding in flight.findings]
+    return sorted(places, key=lambda code: -found[::-1].index(code))
+
+
+def test_a_pallet_that_is_moved_during_the_count_is_counted_where_it_is() -> None:
+    one, other = "AL-02-2-2", "AR-04-1-1"
+    labels = labels_of(SITE) | {one: [Label("PALLET 9")]}
+    flight = Sweep(config().with_values(scan={"mode": ScanMode.STOP}), Stock(labels))
+    flight.fly(until=lambda: one in flight.states)
+    moved = labels | {one: [Label("PALLET 8")], other: [Label("PALLET 9")]}
+    flight.front = IdealFront(SITE, SIGHT, Stock(moved))
+    flight.fly(900.0)
+    assert len(flight.said("contradiction")) == 1
+    last = {finding.location: finding.reads[0].text for finding in flight.findings}
+    assert (last[one], last[other]) == ("PALLET 8", "PALLET 9")
+    assert sorted(booked_of(flight)) == sorted(PLACES)
+
+
 def test_aisle_after_aisle_is_flown_past_with_one_half_turn_each_and_no_way_out_to_bare_ends() -> None:
     flight = Sweep(config().with_values(camera={"mount_yaw_deg": 90.0}), site=BARE_ENDS)
     flight.fly(600.0)
@@ -200,6 +272,42 @@ def test_aisle_after_aisle_is_flown_past_with_one_half_turn_each_and_no_way_out_
     assert not flight.scanned
     assert [node[0] for node, _ in flight.turned] == ["A", "B", "C"], "from one side to the other"
     assert len(flight.legs) == 12
+
+
+@pytest.mark.parametrize(
+    ("levels_m", "flown"),
+    [
+        pytest.param((0.5, 0.75, 1.7), [(1, 2), (1, 2), (3,), (3,)], id="at one height"),
+        pytest.param((0.5, 0.95), [(1,), (1,), (2,), (2,)], id="nearer than it strays"),
+    ],
+)
+def test_levels_that_the_lowest_height_brings_together_are_counted_on_their_own_legs(
+    levels_m: tuple[float, ...], flown: list[tuple[int, ...]]
+) -> None:
+    """It flies a decimetre above each leg."""
+    site = one_aisle(levels_m)
+    flight = Sweep(site=site, stock=Stock({code: [Label(f"PALLET {code}", 0.1)] for code in site.locations}))
+    flight.fly()
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert sorted(leg.levels for leg in flight.legs) == flown
+    assert flight.states == dict.fromkeys(site.locations, LocationState.READ)
+    assert len(flight.findings) == len(site.locations), "nothing is counted twice"
+    assert not flight.scanned, flight.said("swept")
+
+
+def test_a_picture_that_is_read_late_counts_for_the_leg_on_which_it_was_taken() -> None:
+    scanner = scanner_of(config(), one_aisle((0.5, 0.95)))
+    legs = scanner.legs(("A1", "A2", "A3", "A4"), "A1", -math.pi / 2, 0.8)
+    scanner.begin_sweep(legs)
+    scanner.begin_leg(0)
+    for k, leg in enumerate(legs[:2]):
+        scanner.step_sweep(k * 10 * PICTURE_NS, leg, 0.8)
+    between_m = (legs[0].height_m + legs[1].height_m) / 2
+    for k in (9, 11):
+        here = shelves.pose(k * PICTURE_NS, height_m=between_m)
+        seen = {place.location for place in scanner.places(here)}
+        assert seen
+        assert seen <= set(legs[k // 10].locations)
 
 
 def test_between_two_legs_it_waits_for_nothing_but_height_and_heading() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 
 import pytest
@@ -11,18 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightd.config.front_camera import FrontCameraConfig
-from flightd.config.scan import ScanConfig
 from flightd.config.schema import Config
 from flightd.mission.plan.itinerary import in_best_order
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
-from flightd.mission.scan.sweep_planner import SweepPlanner, told
+from flightd.mission.scan.sweep_planner import SweepPlanner
 from flightd.mission.scan.sweep_speed import SweepOptics
+from flightd.mission.scan.told_sweeps import told
 from flightd.mission.scan.views import ViewPlanner
 from flightd.site.site import Side, Site
 from flightd.site.site_file import parse_site
 from tests.unit.mission.configured import configured
-from tests.unit.mission.shelves import BARE_ENDS, SIGHT, SITE
+from tests.unit.mission.shelves import BARE_ENDS, SIGHT, SITE, one_aisle
 
 NODES = ("A1", "A2", "A3", "A4")
 ALL = frozenset(SITE.locations)
@@ -32,7 +33,7 @@ CONFIG = configured()
 def sweeps(site: Site = SITE, sight: FrontSight = SIGHT, config: Config = CONFIG) -> SweepPlanner:
     assigner = Assigner(site, sight)
     return SweepPlanner(
-        site, ViewPlanner(site, sight, assigner, ScanConfig()), assigner, SweepOptics.of(config)
+        site, ViewPlanner(site, sight, assigner, config.scan), assigner, SweepOptics.of(config)
     )
 
 
@@ -136,8 +137,25 @@ def test_levels_whose_places_fit_one_picture_are_flown_past_together() -> None:
     assert {lane.levels for lane in PLANNER.lanes("A", ALL)} == {(1,), (2,)}
 
 
-def test_a_one_way_aisle_is_counted_by_stopping() -> None:
-    text = """
+@settings(max_examples=40)
+@given(
+    st.lists(st.floats(0.1, 3.0), min_size=1, max_size=5),
+    st.floats(0.5, 1.5),
+    st.none() | st.floats(1.5, 3.0),
+)
+def test_whatever_the_limits_of_the_height_each_place_is_on_one_lane_and_no_two_show_the_same(
+    heights_m: list[float], least_m: float, most_m: float | None
+) -> None:
+    levels_m = sorted({round(height_m, 1) for height_m in heights_m})
+    site = one_aisle(levels_m)
+    scan = {"min_height_m": least_m, "max_height_m": most_m}
+    lanes = sweeps(site, config=configured().with_values(scan=scan)).lanes("A", site.locations)
+    assert sorted(place.code for lane in lanes for place in lane.places) == sorted(site.locations)
+    for one, other in pairwise(lanes):
+        assert one.side is not other.side or other.height_m - one.height_m >= 0.05
+
+
+ONE_WAY = """
 [site]
 name = "one way"
 ceiling_m = 6.0
@@ -164,7 +182,11 @@ id = "home"
 node = "A1"
 size_m = 0.5
 """
-    site = parse_site(text, "one way")
+"""The first of two aisles is flown one way."""
+
+
+def test_a_one_way_aisle_is_counted_by_stopping() -> None:
+    site = parse_site(ONE_WAY, "one way")
     planner = sweeps(site)
     everything = frozenset(site.locations)
     assert not planner.legs(("A1", "A2", "A3"), everything, "A1", 0.0, 1.0)
@@ -172,13 +194,55 @@ size_m = 0.5
 
 
 def test_the_plan_says_once_what_is_alike_and_what_limits_it() -> None:
-    first, second = told(PLANNER.lanes("A", ALL))
+    first, second = told(PLANNER.judged(NODES, ALL, "A1", 0.0, 0.0))
     assert (first.levels, second.levels, first.places + second.places) == ((1,), (2,), len(ALL))
     assert first.limit == "cruise"
     assert "mission.speed_mps" in first.text
-    small = told(sweeps(config=configured().with_values(scan={"sweep": {"module_m": 0.001}})).lanes("A", ALL))
-    assert not small[0].swept
-    assert "by stopping" in small[0].text
+    assert "2.50 px per module, a blur of 0.53 in 2 ms" in first.text
+
+
+@pytest.mark.parametrize(
+    ("site", "run", "sweep", "why", "words"),
+    [
+        (
+            SITE,
+            NODES,
+            {"module_m": 0.001},
+            "labels",
+            "labels are not surely read; labels get 0.83 px per module, 2.5 are needed",
+        ),
+        (one_aisle(bay_m=2.6, positions=1), NODES, {}, "width", "its places are wider than the picture"),
+        (SITE, ("A2",), {}, "nodes", "before one node only"),
+        (parse_site(ONE_WAY, "one way"), ("A1", "A2", "A3"), {}, "line", "not open and clear both ways"),
+    ],
+)
+def test_the_plan_says_of_what_is_not_flown_past_why(
+    site: Site, run: tuple[str, ...], sweep: dict[str, float], why: str, words: str
+) -> None:
+    planner = sweeps(site, config=configured().with_values(scan={"sweep": sweep}))
+    codes = frozenset(site.locations)
+    assert not planner.legs(run, codes, run[0], 0.0, 0.0)
+    sweeps_told = told(planner.judged(run, codes, run[0], 0.0, 0.0))
+    assert not any(each.swept for each in sweeps_told)
+    assert json.dumps([asdict(each) for each in sweeps_told], allow_nan=False)
+    texts = [each.text for each in sweeps_told if each.stops_for == why]
+    assert texts
+    assert all("by stopping; " in text and words in text for text in texts)
+
+
+@settings(max_examples=40)
+@given(
+    st.sets(st.sampled_from(sorted(ALL)), min_size=1),
+    st.lists(st.sampled_from(NODES), min_size=1, max_size=4, unique=True),
+)
+def test_what_is_told_as_flown_past_is_what_is_flown_past(wanted: set[str], run: list[str]) -> None:
+    judged = PLANNER.judged(run, frozenset(wanted), run[0], 0.0, 0.0)
+    legs = PLANNER.legs(run, frozenset(wanted), run[0], 0.0, 0.0)
+    flown = {(one.lane.side, one.lane.levels) for one in judged if one.stops_for is None}
+    assert flown == {(leg.side, leg.levels) for leg in legs}
+    assert sum(len(one.lane.places) for one in judged) == len(
+        [code for code in wanted if SITE.locations[code].node in run]
+    )
 
 
 @settings(max_examples=40)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightd.config.schema import Config
-from flightd.mission.scan.sweep_speed import Limit, Shelf, SweepOptics, sweep_speed
+from flightd.mission.scan.sweep_speed import Limit, Shelf, StopCause, SweepOptics, sweep_speed
 from flightd.site.coverage import MAX_BLUR_MODULES, MIN_PX_PER_MODULE, FrontView
 from tests.unit.mission.configured import configured
 
@@ -50,7 +50,8 @@ def test_no_limit_is_broken_and_the_lowest_is_told(
     assert speed.speed_mps == limits[speed.limit] == min(limits.values())
     assert speed.blur_modules <= MAX_BLUR_MODULES + 1e-9
     assert optics.least_exposure - 1e-9 <= speed.exposure <= 1.0
-    if speed.readable:
+    assert all(math.isfinite(value) for value in (speed.views, speed.needed_fps, speed.blur_modules))
+    if speed.stops_for is None:
         assert speed.px_per_module >= MIN_PX_PER_MODULE - 1e-3
         assert speed.views >= optics.views - 1e-6
         assert speed.needed_fps <= optics.fps + 1e-6
@@ -82,7 +83,7 @@ def fields(optics: SweepOptics) -> tuple[float, float, float, int, float, float 
 def test_the_shipped_camera_is_limited_by_the_cruise_speed() -> None:
     speed = sweep_speed(SHELF, of())
     assert (speed.limit, speed.speed_mps, speed.exposure) == (Limit.CRUISE, 0.8, 1.0)
-    assert speed.readable
+    assert speed.stops_for is None
 
 
 @pytest.mark.parametrize(
@@ -112,4 +113,9 @@ def test_a_shorter_exposure_is_taken_only_as_far_as_the_speed_asks_for() -> None
 
 
 def test_labels_too_small_in_the_picture_are_not_flown_past() -> None:
-    assert not sweep_speed(Shelf(1.5, 0.65), of()).readable
+    assert sweep_speed(Shelf(1.5, 0.65), of()).stops_for is StopCause.LABELS
+
+
+def test_places_that_are_wider_than_the_picture_are_not_flown_past() -> None:
+    speed = sweep_speed(Shelf(1.2, 3.0), of())
+    assert (speed.stops_for, speed.speed_mps, speed.needed_fps) == (StopCause.WIDTH, 0.0, 0.0)

@@ -50,6 +50,9 @@ class StubbornStore:
     def settle(self, run: str, locations: Iterable[str], confirmed: bool) -> None:
         self._store.settle(run, locations, confirmed)
 
+    def contradict(self, run: str, locations: Iterable[str]) -> None:
+        self._store.contradict(run, locations)
+
     def withdraw_pending(self, run: str) -> None:
         self._store.withdraw_pending(run)
 
@@ -88,6 +91,18 @@ def test_findings_count_only_once_they_are_confirmed(tmp_path: Path) -> None:
     assert troubles == []
     assert (writer.written, writer.waiting) == (12, 0)
     assert all(record.observation.evidence for record in records if record.observation)
+
+
+def test_a_contradicted_booking_is_withdrawn_on_the_disk(tmp_path: Path) -> None:
+    async def main(store: SqliteStore) -> None:
+        with StoreWriter(store, "run", 0, LoopClock(), lambda _: None) as writer:
+            writer.put(finding(0), b"")
+            writer.settle(Settled(("A-0",), confirmed=True))
+            writer.settle(Settled(("A-0",), confirmed=False, booked=True))
+
+    with SqliteStore(tmp_path) as store:
+        virtual(main(store))
+        assert store.counted("run") == frozenset()
 
 
 def test_a_disk_that_refuses_is_told_and_tried_again(tmp_path: Path) -> None:

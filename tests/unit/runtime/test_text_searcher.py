@@ -6,6 +6,7 @@ import asyncio
 import importlib.util
 import os
 import re
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from flightd.core.inventory import LocationState
 from flightd.core.label_values import LabelValue, ValueKind, ValueSource
 from flightd.core.scanning import Finding
 from flightd.runtime.clock import LoopClock
+from flightd.vision.shelf import text_reader
 from tests.rigs.event_loops import real
 from tests.rigs.waiting import until
 
@@ -38,6 +40,8 @@ def searching() -> Callable[[bytes], tuple[LabelValue, ...] | None]:
     def search(jpeg: bytes) -> tuple[LabelValue, ...] | None:
         if jpeg == b"deadly":
             os._exit(1)
+        if jpeg == b"endless":
+            threading.Event().wait()
         return None if jpeg == b"broken" else (LOT,)
 
     return search
@@ -80,9 +84,9 @@ def test_what_is_counted_is_searched_and_kept_with_its_look(tmp_path: Path) -> N
 def test_without_the_extra_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     words = r"\[\[scan\.text\]\]: printed text is not read, it needs what is not installed \(extra ocr\)"
-    assert re.match(words, str(text_searcher.needs_extra()))
+    assert re.match(words, str(text_reader.needs_extra()))
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
-    assert text_searcher.needs_extra() is None
+    assert text_reader.needs_extra() is None
 
 
 def test_what_is_not_searched_is_counted_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,3 +113,41 @@ def test_what_is_not_searched_is_counted_and_told(monkeypatch: pytest.MonkeyPatc
     assert line.startswith(
         "inventory: 5 pictures were not searched for printed text; flightd inventory texts"
     )
+
+
+def test_a_process_that_hangs_is_replaced_and_its_picture_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def flight() -> None:
+        with TextSearcher(store, PATTERNS, said.append, make=searching) as texts:
+            task = asyncio.create_task(texts.run())
+            texts.put("hangs", b"endless")
+            texts.put("alive again", b"a picture")
+            await until(lambda: texts.searched == 1, within_s=60)
+            for number in range(2):
+                texts.put(f"hangs {number}", b"endless")
+            texts.put("never", b"a picture")
+            await until(lambda: texts.lost == 3, within_s=60)
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    monkeypatch.setattr(text_searcher, "_LONGEST_S", 0.1)
+    store, said = Told(), list[str]()
+    real(flight())
+    assert store.kept == {"alive again": (LOT,)}
+    assert "no more in this flight" in said[0]
+    assert said[1].startswith("inventory: 4 pictures were not searched")
+
+
+def test_what_is_written_at_the_end_of_a_flight_is_told_as_not_searched(tmp_path: Path) -> None:
+    async def flight() -> None:
+        with (
+            SqliteStore(tmp_path) as store,
+            TextSearcher(store, PATTERNS, said.append, make=searching) as texts,
+            StoreWriter(store, "r", 0, LoopClock(), said.append, on_written=texts.put) as writer,
+        ):
+            writer.put(finding(1), b"a picture")
+            writer.put(replace(finding(2), state=LocationState.EMPTY), b"another picture")
+
+    said: list[str] = []
+    real(flight())
+    (line,) = said
+    assert line.startswith("inventory: 1 pictures were not searched")

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import CaseGrid, LocationState, Observation, PlaceFill, PlannedLocation
+from flightd.core.inventory import CaseGrid, LocationState, Observation, PlaceFill, PlannedLocation, Standing
 from flightd.core.types import CodeRead
 from flightd.ports import Store
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
@@ -250,6 +250,37 @@ def test_a_pending_look_counts_for_nothing_until_it_is_confirmed(tmp_path: Path)
         assert store.counted(first.run) == {first.location}
 
 
+def test_which_looks_were_second_ones_is_read_back_and_merged(tmp_path: Path) -> None:
+    looks = [look(1), replace(look(2), again=True)]
+    with SqliteStore(tmp_path / "a") as store, SqliteStore(tmp_path / "b") as other:
+        for seen in looks:
+            store.commit(seen)
+        other.merge(store)
+        assert [seen.again for seen, _ in store.looks()] == [False, True]
+        assert other.looks() == store.looks()
+
+
+def test_a_booked_place_that_is_contradicted_is_counted_no_more_and_keeps_its_history(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as store:
+        seen, again, other = look(1), look(51), look(2)
+        assert (seen.location, seen.run) == (again.location, again.run)
+        for one in (seen, other):
+            store.commit(one)
+        store.contradict(seen.run, [seen.location])
+        assert seen.location not in store.counted(seen.run), "the run's remainder looks there again"
+        assert newest(store, seen.location) is None
+        assert newest(store, other.location) == other.id
+        assert [kept.id for kept in store.history(seen.location)] == [seen.id]
+        store.commit(again, confirmed=False)
+        store.settle(again.run, [again.location], confirmed=True)
+        store.commit(seen)
+        assert newest(store, seen.location) == again.id
+        assert [standing for _, standing in store.looks(seen.location)] == [
+            Standing.WITHDRAWN,
+            Standing.CONFIRMED,
+        ]
+
+
 def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path: Path) -> None:
     with SqliteStore(tmp_path / "a") as one, SqliteStore(tmp_path / "b") as other:
         seen = look(1)
@@ -265,15 +296,23 @@ def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path:
         assert [kept.id for kept in other.history(seen.location)] == [seen.id]
 
 
-TO_5 = (
+TO_6 = (
     "ALTER TABLE place_fill DROP COLUMN case_columns",
     "ALTER TABLE place_fill DROP COLUMN case_rows",
     "ALTER TABLE location DROP COLUMN pallets_deep",
 )
+TO_5 = (*TO_6, "ALTER TABLE observation DROP COLUMN again")
 TO_4 = (*TO_5, "ALTER TABLE place_fill DROP COLUMN lean_m")
-TO_3 = (TO_5[2], "DROP TABLE place_fill")
+TO_3 = (*TO_5[2:], "DROP TABLE place_fill")
 TO_2 = (*TO_3, "ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
-OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2, 3: TO_3, 4: TO_4, 5: TO_5}
+OLDER = {
+    1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"),
+    2: TO_2,
+    3: TO_3,
+    4: TO_4,
+    5: TO_5,
+    6: TO_6,
+}
 
 
 @pytest.mark.parametrize("version", OLDER)

@@ -56,8 +56,24 @@ class PlannedPass(msgspec.Struct, frozen=True):
     views: Annotated[float, Meta(description="pictures that show each place whole")]
     fps: Annotated[float, Meta(description="frames that are read, 1/s")]
     needed_fps: Annotated[float, Meta(description="frames that this speed needs, 1/s")]
-    swept: Annotated[bool, Meta(description="false: counted by stopping, its labels are too small")]
+    swept: Annotated[bool, Meta(description="false: counted by stopping")]
     text: Annotated[str, Meta(description="all that in a line")]
+    stops_for: Annotated[
+        str,
+        Meta(
+            description="why by stopping: labels, width (of a place), line, nodes (too few); empty: it is not"
+        ),
+    ] = ""
+
+
+class PlannedUnread(msgspec.Struct, frozen=True):
+    """Places whose labels are not surely read, from as near as a stop looks from."""
+
+    places: Annotated[int, Meta(description="of those that are counted")]
+    px_per_module: Annotated[float, Meta(description="from the aisle's line, at the worst place")]
+    within_m: Annotated[float, Meta(description="from the shelf they would be read, m")]
+    what: Annotated[str, Meta(description="how many, and whether they are read at all")]
+    remedy: Annotated[str, Meta(description="what helps")]
 
 
 class Planned(DaemonAnswer, frozen=True, tag="planned"):
@@ -75,6 +91,9 @@ class Planned(DaemonAnswer, frozen=True, tag="planned"):
     ]
     battery_s: Annotated[float, Meta(description="time in the air of a full battery down to its reserve, s")]
     sweeps: Annotated[tuple[PlannedPass, ...], Meta(description="what is counted in passing, and how")] = ()
+    unread: Annotated[
+        PlannedUnread | None, Meta(description="of these places, with labels too small to read; null: none")
+    ] = None
     dry: Annotated[bool, Meta(description="only said, not taken")] = False
     repeated: Annotated[bool, Meta(description="this id was done before; it was not done again")] = False
 

@@ -19,6 +19,7 @@ export default {
   "brightness": "Helligkeit",
   "flicker": "Flimmern",
   "calibration": "Kalibrierung",
+  "labels": "Etiketten",
   "learnt": "Gelerntes",
   "clock": "Uhr",
   "disk": "Festplatte",

@@ -1,0 +1,66 @@
+"""At which places a flight has found each single thing.  Pure.
+
+One thing cannot be at two places: what is found at both counts at neither until both were looked at again.
+What that shows counts, for then there is a label at each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from flightd.core.scanning import Finding
+from flightd.mission.scan.code_identity import names_one_thing
+
+
+@dataclass(frozen=True, slots=True)
+class Contradiction:
+    """One thing was found at `place` and at the `others`; what was found at those that are `again` to be
+    looked at counts no more.  None are where all of them were already."""
+
+    place: str
+    others: tuple[str, ...]
+    again: frozenset[str]
+
+    def __str__(self) -> str:
+        others = ", ".join(self.others)
+        text = f"one code at {others} and {self.place}: counted at each"
+        if self.again:
+            text = f"one code at {others} and {self.place}: to be looked at again"
+        return text
+
+
+class CodeOwners:
+    """Call `take` for each finding, whichever way it came, and `forget` for those that count no more."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, set[str]] = {}
+        self._again: set[str] = set()
+        self._at_many: set[str] = set()
+
+    def take(self, found: Finding) -> Contradiction | None:
+        """What contradicts the finding, which is the place's own unless it is to be looked at again."""
+        texts = {read.text for read in found.reads if names_one_thing(read)}
+        twice = {text for text in texts if self._places.get(text, set()) - {found.location}}
+        others = {place for text in twice for place in self._places[text]} - {found.location}
+        # a text that hangs at two places surely names no single thing
+        again = set() if twice <= self._at_many else ({found.location} | others) - self._again
+        self._again |= again
+        self._drop(again)
+        if found.location not in again:
+            for text in texts:
+                self._places.setdefault(text, set()).add(found.location)
+        if not others:
+            return None
+        if not again:
+            self._at_many |= twice
+        return Contradiction(found.location, tuple(sorted(others)), frozenset(again))
+
+    def forget(self, places: Iterable[str]) -> None:
+        """The drone may have been elsewhere when it looked at these."""
+        gone = set(places)
+        self._again -= gone
+        self._drop(gone)
+
+    def _drop(self, places: set[str]) -> None:
+        self._places = {text: left for text, at in self._places.items() if (left := at - places)}
