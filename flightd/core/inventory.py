@@ -43,10 +43,16 @@ class Standing(enum.IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class PlannedLocation:
-    """A place that must be counted, and the node of the map it is counted from."""
+    """A place that must be counted, and the node of the map it is counted from; so many pallets stand behind
+    one another in it."""
 
     code: str
     node: str
+    pallets_deep: int = 1
+
+    def __post_init__(self) -> None:
+        if self.pallets_deep < 1:
+            raise ValueError(f"{self.code}: {self.pallets_deep} pallets deep")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +67,33 @@ class CountPose:
 
 
 @dataclass(frozen=True, slots=True)
+class CaseGrid:
+    """The cases of one kind in the front of a regular stack: what is seen, never what stands behind."""
+
+    columns: int
+    rows: int
+
+    def __post_init__(self) -> None:
+        if min(self.columns, self.rows) < 1:
+            raise ValueError(f"a stack of {self.columns} by {self.rows} cases")
+
+    @property
+    def count(self) -> int:
+        """The cases in the front."""
+        return self.columns * self.rows
+
+
+@dataclass(frozen=True, slots=True)
 class PlaceFill:
     """How full a place is: the `share` of its opening, 0..1 as seen straight from before it, in which goods
     stand; None where the pictures do not tell.  `overhang_m` is how far goods are seen to stand out over the
     rack's face, None where none are.  `lean_m` is how far the top of the goods that are seen to lean most is
-    aside of their foot, None where that is not known."""
+    aside of their foot, `cases` what is seen of a regular stack; None where that is not known."""
 
     share: float | None
     overhang_m: float | None = None
     lean_m: float | None = None
+    cases: CaseGrid | None = None
 
     def __post_init__(self) -> None:
         if self.share is not None and not 0.0 <= self.share <= 1.0:
@@ -134,15 +158,22 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class LocationRecord:
-    """A location as it stands: by its newest observation, None while nobody looked."""
+    """A location as it stands: by its newest observation, None while nobody looked.  Of `pallets_deep`
+    pallets behind one another what stands in front is counted, never what is behind."""
 
     code: str
     node: str
     observation: Observation | None
+    pallets_deep: int = 1
 
     @property
     def state(self) -> LocationState:
         return self.observation.state if self.observation else LocationState.NOT_VISITED
+
+    @property
+    def pallets_seen(self) -> int:
+        """Of the pallets behind one another, how many the look shows: the first, or none."""
+        return int(self.state not in {LocationState.NOT_VISITED, LocationState.OCCLUDED})
 
     @property
     def texts(self) -> tuple[str, ...]:

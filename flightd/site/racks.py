@@ -144,7 +144,8 @@ def _fill(
                     x_m = left_x_m + (position - 0.5) * place_m
                     node = min(nodes, key=lambda node: abs(node.x_m - x_m))
                     found[code] = Location(
-                        code, shelf.aisle, shelf.side, bay, level, position, x_m, shelf.y_m, height_m, node.id
-                    )
+                        code, shelf.aisle, shelf.side, bay, level, position, x_m, shelf.y_m, height_m,
+                        node.id, rack.pallets_deep,
+                    )  # fmt: skip
     if not bay:
         raise RackError(f"{key}.bay_width_m: {rack.bay_width_m:g} m is wider than every front of the aisle")

@@ -158,7 +158,8 @@ class Rack:
     """How the shelf fronts on `sides` of `aisles` are divided.  Bays of `bay_width_m` stand in the middle
     of each front; `levels_m` are the heights at which the labels hang; each level of a bay has `positions`
     places.  `pattern` makes the location code of {aisle} {side} (L, R) {bay} {level} {position}.  Goods stand
-    `deck_below_label_m` below their labels; None: two fifths of the level spacing."""
+    `deck_below_label_m` below their labels; None: two fifths of the level spacing.  In each place so many
+    pallets stand behind one another as `pallets_deep` says."""
 
     aisles: tuple[str, ...]
     bay_width_m: float
@@ -167,11 +168,13 @@ class Rack:
     sides: tuple[Side, ...] = (Side.LEFT, Side.RIGHT)
     pattern: str = "{aisle}{side}-{bay:02}-{level}-{position}"
     deck_below_label_m: float | None = None
+    pallets_deep: int = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """One place for goods: where its label hangs on the shelf front, and the node that faces it."""
+    """One place for goods: where its label hangs on the shelf front, the node that faces it, and how many
+    pallets stand behind one another in it."""
 
     code: str
     aisle: str
@@ -183,6 +186,7 @@ class Location:
     y_m: float
     height_m: float
     node: str
+    pallets_deep: int = 1
 
 
 @dataclass(frozen=True)

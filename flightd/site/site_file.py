@@ -41,6 +41,7 @@
     deck_below_label_m = 0.4     # from the labels down to what goods stand on; left out: 2/5 of the spacing
     positions = 2                # places in each bay on each level
     pattern = "{aisle}{side}-{bay:02}-{level}-{position}"  # location codes: AL-01-2-1
+    pallets_deep = 1             # pallets behind one another in each place; the camera sees the first alone
 
     [[pad]]
     id = "home"                  # missions start and end here; without it, at the first to start from
@@ -136,6 +137,7 @@ def site_toml(site: Site) -> str:
         parts += [f"pattern = {quoted(rack.pattern)}"]
         if rack.deck_below_label_m is not None:
             parts += [f"deck_below_label_m = {rack.deck_below_label_m!r}"]
+        parts += [f"pallets_deep = {rack.pallets_deep}"] if rack.pallets_deep > 1 else []
     for pad in site.pads:
         parts += ["", "[[pad]]", f"id = {quoted(pad.id)}", f"node = {quoted(pad.node)}"]
         parts += [f"size_m = {pad.size_m!r}"]

@@ -81,6 +81,7 @@ class _RackTable(Section):
     positions: int = Field(1, ge=1, le=100)
     pattern: str = Field("{aisle}{side}-{bay:02}-{level}-{position}", min_length=1, max_length=100)
     deck_below_label_m: float | None = Field(None, ge=0, le=10)
+    pallets_deep: int = Field(1, ge=1, le=50)
 
 
 class _PadTable(Section):
@@ -202,6 +203,7 @@ def _rack(table: _RackTable, aisles: tuple[_AisleTable, ...]) -> Rack:
         table.sides,
         table.pattern,
         table.deck_below_label_m,
+        table.pallets_deep,
     )
 
 

@@ -216,7 +216,10 @@ async def test_a_drone_that_does_not_tell_how_full_places_are_delivers_as_before
     async with asked(hall, tmp_path / "state", Scope.DELIVER, Scope.STOCK) as program:
         assert (await program.post("/deliveries", older))[1]["new"] == 2
         fills = {row["location"]: row["fill"] for row in (await program.page(f"/stock?{_QUERY}"))["rows"]}
-        assert (fills["B-1"], fills["B-2"]) == (None, {"share": 0.5, "overhang_m": 0.04, "lean_m": None})
+        assert (fills["B-1"], fills["B-2"]) == (
+            None,
+            {"share": 0.5, "overhang_m": 0.04, "lean_m": None, "cases": None},
+        )
         (row,) = (await program.page(f"/history?{_QUERY}&location=B-2"))["rows"]
         assert row["fill"] == fills["B-2"]
         older["looks"][0]["observation"]["fill"] = {"share": 1.5, "overhang_m": None}

@@ -26,7 +26,7 @@ from flightd.adapters.store.label_texts import (
     merge_texts,
     was_searched,
 )
-from flightd.adapters.store.place_fills import FILL_TABLES, LEAN_COLUMN, keep_fill, kept_fills
+from flightd.adapters.store.place_fills import CASE_COLUMNS, FILL_TABLES, LEAN_COLUMN, keep_fill, kept_fills
 from flightd.adapters.store.read_only import connect_read_only
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
@@ -41,15 +41,15 @@ from flightd.core.inventory import (
 from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
-_VERSION = 6
+_VERSION = 7
 _WITH_TEXTS = 3
 """The first format with module sizes and printed text."""
 _WITH_FILLS = 4
 """The first that says how full places are."""
-_WITH_LEAN = 5
-"""The first that says how much goods lean."""
-_READABLE = (2, 3, 4, 5, _VERSION)
-"""Formats that are read as they are: nothing but that, and which looks are second ones, is missing."""
+_WITH_AGAIN = 6
+"""The first that says which looks are second ones."""
+_READABLE = (2, 3, 4, 5, 6, _VERSION)
+"""Formats that are read as they are: what they lack is not known, and places are one pallet deep."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
 _TAKEN_OVER = {
@@ -58,12 +58,14 @@ _TAKEN_OVER = {
     3: FILL_TABLES,
     4: LEAN_COLUMN,
     5: ("ALTER TABLE observation ADD COLUMN again INTEGER NOT NULL DEFAULT 0",),
+    6: (*CASE_COLUMNS, "ALTER TABLE location ADD COLUMN pallets_deep INTEGER NOT NULL DEFAULT 1"),
 }
 """What makes a file of each earlier format one of the next."""
 _SCHEMA = """
 CREATE TABLE location (
     code TEXT PRIMARY KEY,
-    node TEXT NOT NULL
+    node TEXT NOT NULL,
+    pallets_deep INTEGER NOT NULL DEFAULT 1
 ) STRICT, WITHOUT ROWID;
 CREATE TABLE observation (
     id TEXT PRIMARY KEY,
@@ -90,7 +92,7 @@ CREATE TABLE code_read (
     module_px REAL,
     PRIMARY KEY (observation, number)
 ) STRICT, WITHOUT ROWID;
-""" + "".join(f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES, *LEAN_COLUMN))
+""" + "".join(f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES, *LEAN_COLUMN, *CASE_COLUMNS))
 
 
 class SqliteStore:
@@ -221,11 +223,12 @@ class SqliteStore:
                 raise InputError(f"{self._file}: no inventory, or a damaged one: {err}") from err
 
     def plan(self, locations: Iterable[PlannedLocation]) -> None:
-        """Make locations known; the node of a known one follows the newest plan."""
-        rows = [(location.code, location.node) for location in locations]
+        """Make locations known; node and depth of a known one follow the newest plan."""
+        rows = [(location.code, location.node, location.pallets_deep) for location in locations]
         with self._transaction():
             self._db.executemany(
-                "INSERT INTO location VALUES (?, ?) ON CONFLICT (code) DO UPDATE SET node = excluded.node",
+                "INSERT INTO location VALUES (?, ?, ?) ON CONFLICT (code)"
+                " DO UPDATE SET node = excluded.node, pallets_deep = excluded.pallets_deep",
                 rows,
             )
 
@@ -287,7 +290,7 @@ class SqliteStore:
     def _insert(self, seen: Observation, standing: int) -> None:
         pose = seen.pose
         node = pose.node if pose else ""
-        self._db.execute("INSERT OR IGNORE INTO location VALUES (?, ?)", (seen.location, node))
+        self._db.execute("INSERT OR IGNORE INTO location (code, node) VALUES (?, ?)", (seen.location, node))
         where = (pose.node, pose.x_m, pose.y_m, pose.height_m, pose.yaw_rad) if pose else (None,) * 5
         cursor = self._db.execute(
             "INSERT OR IGNORE INTO observation VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -336,8 +339,9 @@ class SqliteStore:
         with self._reading():
             looks = self._observations()
             newest = {seen.location: seen for seen, standing in looks if standing == Standing.CONFIRMED}
-            rows = self._db.execute("SELECT code, node FROM location ORDER BY code").fetchall()
-        return [LocationRecord(code, node, newest.get(code)) for code, node in rows]
+            deep = "pallets_deep" if self._version == _VERSION else "1"
+            rows = self._db.execute(f"SELECT code, node, {deep} FROM location ORDER BY code").fetchall()  # noqa: S608
+        return [LocationRecord(code, node, newest.get(code), depth) for code, node, depth in rows]
 
     def history(self, location: str) -> list[Observation]:
         """Every look at one location, oldest first, pending and withdrawn ones too."""
@@ -362,9 +366,8 @@ class SqliteStore:
             )
             reads.setdefault(seen, []).append(read)
         texts = kept_texts(self._db) if self._version >= _WITH_TEXTS else {}
-        with_fills = self._version >= _WITH_FILLS
-        fills = kept_fills(self._db, with_lean=self._version >= _WITH_LEAN) if with_fills else {}
-        again = "again" if self._version == _VERSION else "0"
+        fills = kept_fills(self._db) if self._version >= _WITH_FILLS else {}
+        again = "again" if self._version >= _WITH_AGAIN else "0"
         rows = self._db.execute(
             f"SELECT id, run, location, utc_ns, state, confidence, evidence, {again}, "  # noqa: S608
             "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "
@@ -384,7 +387,9 @@ class SqliteStore:
     def merge(self, other: SqliteStore) -> int:
         """Take in everything of another store, pictures included; returns how many looks were new."""
         with other._reading():
-            planned = [PlannedLocation(record.code, record.node) for record in other.locations()]
+            planned = [
+                PlannedLocation(record.code, record.node, record.pallets_deep) for record in other.locations()
+            ]
             seen = other._observations()
             searched = all_searches(other._db) if other._version >= _WITH_TEXTS else []
         for observation, _ in seen:
@@ -392,8 +397,8 @@ class SqliteStore:
                 self.evidence.keep(other.evidence.path(observation.evidence).read_bytes())
         with self._transaction():
             before = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
-            rows = [(location.code, location.node) for location in planned]
-            self._db.executemany("INSERT OR IGNORE INTO location VALUES (?, ?)", rows)
+            rows = [(location.code, location.node, location.pallets_deep) for location in planned]
+            self._db.executemany("INSERT OR IGNORE INTO location VALUES (?, ?, ?)", rows)
             for observation, standing in seen:
                 self._insert(observation, standing)
             merge_texts(self._db, searched)

@@ -13,11 +13,12 @@ from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.core.csv_text import inert
 from flightd.core.inventory import LocationRecord
 from flightd.core.utc_time import utc_text
+from flightd.inventory.export.rows import DEPTH_COLUMNS, FILL_COLUMNS, fill_cells
 from flightd.sim.racks.stock_truth import score_stock
 
 _COLUMNS = (
     "location", "node", "state", "texts", "symbology", "confidence", "utc", "x_m", "y_m", "height_m", "run",
-    "evidence",
+    "evidence", *FILL_COLUMNS, *DEPTH_COLUMNS,
 )  # fmt: skip
 
 
@@ -60,9 +61,10 @@ def _records(folder: Path) -> list[LocationRecord] | None:
 
 
 def _row(record: LocationRecord) -> list[str | float]:
-    seen = record.observation
+    seen, depth = record.observation, (record.pallets_deep, record.pallets_seen)
     if seen is None:
-        return [record.code, record.node, record.state.value, *[""] * (len(_COLUMNS) - 3)]
+        empty = [""] * (len(_COLUMNS) - 3 - len(depth))
+        return [record.code, record.node, record.state.value, *empty, *depth]
     pose = seen.pose
     symbologies = dict.fromkeys(read.symbology for read in seen.reads)
     where = (pose.x_m, pose.y_m, pose.height_m) if pose else ("", "", "")
@@ -77,4 +79,6 @@ def _row(record: LocationRecord) -> list[str | float]:
         *(round(value, 3) if isinstance(value, float) else value for value in where),
         seen.run,
         seen.evidence,
+        *fill_cells(seen),
+        *depth,
     ]

@@ -37,6 +37,7 @@ def plan(
     if not site.locations:
         raise InputError("has no locations", file=site_file, remedy="add a [[rack]]")
     with SqliteStore(folder) as store:
-        store.plan(PlannedLocation(location.code, location.node) for location in site.locations.values())
+        places = site.locations.values()
+        store.plan(PlannedLocation(place.code, place.node, place.pallets_deep) for place in places)
         records = store.locations()
     print(json.dumps({"locations": len(records)}) if as_json else states_line(records))

@@ -34,7 +34,8 @@ def show(
 ) -> None:
     """Show the state of every location, or the history of one.
 
-    With --json each has the values that its labels tell besides: lot, dates, quantity, weights.
+    Beside the codes stand lot, expiry, fill and cases, where they are known. With --json each has all
+    that its labels tell: dates, quantity, weights.
 
     \b
     Examples:
@@ -62,7 +63,7 @@ def _show_records(records: Sequence[LocationRecord], as_json: bool, least_confid
         document = {"states": dict(states), "locations": told}
         print(json.dumps(document, indent=1, ensure_ascii=False))
         return
-    print_records(records)
+    print_records(records, least_confidence)
     print(states_line(records))
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
-from flightd.core.inventory import PlaceFill
+from flightd.core.inventory import CaseGrid, PlaceFill
 from flightd.inventory.export.json_document import fill_json
 
 
@@ -15,10 +16,14 @@ def fill_text(fill: PlaceFill | None) -> str | None:
 
 def fill_of(text: str | None) -> PlaceFill | None:
     """The same back."""
-    return None if text is None else PlaceFill(**json.loads(text))
+    if text is None:
+        return None
+    told = json.loads(text)
+    cases = told.pop("cases", None)
+    return PlaceFill(**told, cases=cases and CaseGrid(cases["columns"], cases["rows"]))
 
 
-def fill_shown(text: str | None) -> dict[str, float | None] | None:
+def fill_shown(text: str | None) -> dict[str, Any] | None:
     """The same for people and programs; what was not told then is null."""
     fill = fill_of(text)
     return None if fill is None else fill_json(fill)

@@ -13,8 +13,8 @@ from flightd.ground.ground_store.fill_text import fill_shown
 
 MOST_ROWS = 1000
 _STOCK = (
-    "SELECT place.code, node, state, texts, place.utc_ns, run.name, confidence, evidence, fill"
-    " FROM place LEFT JOIN run ON run.id = place.run"
+    "SELECT place.code, node, state, texts, place.utc_ns, run.name, confidence, evidence, pallets_deep,"
+    " fill FROM place LEFT JOIN run ON run.id = place.run"
 )
 _DIFFERENCES = (
     "SELECT code, kind, utc_ns, state, texts, run.name, before_ns, before_state, before_texts"
@@ -86,8 +86,8 @@ def stock(
         f"{_STOCK} WHERE place.site = ?{where} AND place.code > ? ORDER BY place.code LIMIT ?",
         site, *values, after, limit,
     )  # fmt: skip
-    names = ("location", "node", "state", "texts", "utc_ns", "run", "confidence", "evidence", "fill")
-    return [{**_document(names, row), "fill": fill_shown(row[-1])} for row in rows]
+    names = ("location", "node", "state", "texts", "utc_ns", "run", "confidence", "evidence", "pallets_deep")
+    return [{**_document(names, row[:-1]), "fill": fill_shown(row[-1])} for row in rows]
 
 
 def differences(session: Session, run: int, after: str, limit: int) -> list[dict[str, Any]]:

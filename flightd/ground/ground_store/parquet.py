@@ -33,6 +33,7 @@ TABLES = {
         "state": "VARCHAR", "confidence": "DOUBLE", "standing": "TINYINT", "node": "VARCHAR", "x_m": "DOUBLE",
         "y_m": "DOUBLE", "height_m": "DOUBLE", "yaw_rad": "DOUBLE", "evidence": "VARCHAR", "reads": "VARCHAR",
         "fill_asked": "BOOLEAN", "fill": "DOUBLE", "overhang_m": "DOUBLE", "lean_m": "DOUBLE",
+        "case_columns": "INTEGER", "case_rows": "INTEGER",
     },
     "differences": {
         "utc": "TIMESTAMP_NS", "observation": "VARCHAR", "site": "VARCHAR", "run": "VARCHAR",
@@ -96,8 +97,9 @@ def _with_fill(row: Row) -> Row:
     *look, fill = row
     told = fill_of(fill)
     if told is None:
-        return (*look, False, None, None, None)
-    return (*look, True, told.share, told.overhang_m, told.lean_m)
+        return (*look, False, None, None, None, None, None)
+    cases = (told.cases.columns, told.cases.rows) if told.cases else (None, None)
+    return (*look, True, told.share, told.overhang_m, told.lean_m, *cases)
 
 
 def _write_csv(file: Path, rows: Iterator[Row]) -> int:

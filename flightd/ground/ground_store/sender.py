@@ -73,7 +73,9 @@ class Delivered:
 def deliver_inventory(folder: Path, site: str, source: str, target: Target, done: Delivered) -> None:
     """All looks of an inventory, with their pictures; each batch is in the store before the next is sent."""
     with opened_for_reading(folder, untouched=True) as inventory:
-        planned = [PlannedLocation(record.code, record.node) for record in inventory.locations()]
+        planned = [
+            PlannedLocation(record.code, record.node, record.pallets_deep) for record in inventory.locations()
+        ]
         looks = inventory.looks()
         for places in _parts(planned):
             target.take(Batch(site, source, places=tuple(places)))

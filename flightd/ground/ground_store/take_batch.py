@@ -89,10 +89,15 @@ def _take_looks(
     noted: Noted,
 ) -> Taken:
     nodes = {place.code: place.node for place in planned}
+    depths = {place.code: place.pallets_deep for place in planned}
     for look in looks:
         pose = look.observation.pose
         nodes.setdefault(look.observation.location, pose.node if pose else "")
     places = _places(session, site, nodes)
+    session.run_many(
+        "UPDATE place SET pallets_deep = ? WHERE id = ? AND pallets_deep <> ?",
+        [(deep, places[code], deep) for code, deep in depths.items()],
+    )
     unique: dict[str, SentLook] = {}
     for look in looks:
         known = unique.get(look.observation.id)

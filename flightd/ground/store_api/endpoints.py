@@ -59,7 +59,8 @@ ENDPOINTS: Sequence[Endpoint] = (
         lambda store, p: store.stock(p["site"], p["after"] or "", p["limit"], p["state"]),
         {
             "location": "string", "node": "string", "state": "state", "texts": "texts", "utc": "time?",
-            "run": "string?", "confidence": "number?", "evidence": "string?", "fill": "fill?",
+            "run": "string?", "confidence": "number?", "evidence": "string?", "pallets_deep": "number",
+            "fill": "fill?",
         },
         "location",
     ),

@@ -20,11 +20,19 @@ _KINDS: dict[str, dict[str, Any]] = {
     "fill": {
         "type": "object",
         "description": "How full the place is, 0 to 1; null in it is unknown.",
-        "required": ["share", "overhang_m", "lean_m"],
+        "required": ["share", "overhang_m", "lean_m", "cases"],
         "properties": {
             "share": {"type": ["number", "null"], "minimum": 0, "maximum": 1},
             "overhang_m": {"type": ["number", "null"], "exclusiveMinimum": 0},
             "lean_m": {"type": ["number", "null"], "minimum": 0},
+            "cases": {
+                "type": ["object", "null"],
+                "description": "Of a regular stack: what is seen of its front, not what stands behind.",
+                "required": ["columns", "rows", "count"],
+                "properties": {
+                    name: {"type": "integer", "minimum": 1} for name in ("columns", "rows", "count")
+                },
+            },
         },
     },
     "change": {"type": "string", "enum": [change.value for change in CountChange]},

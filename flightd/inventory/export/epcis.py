@@ -18,7 +18,7 @@ from flightd.inventory.export.gs1_uri import (
     location_uri,
     place_in,
 )
-from flightd.inventory.export.value_reports import value_reports
+from flightd.inventory.export.value_reports import place_reports, value_reports
 from flightd.vision.shelf.digital_link import elements_of
 from flightd.vision.shelf.gs1 import Gs1Error
 
@@ -42,9 +42,9 @@ def as_epcis(
 
     An event of an empty, unreadable or occluded location has no object: it tells the state as a sensor
     report of the read point (`location_state`), which is the standard's event of a place alone.  One that
-    nobody looked at has none.  What is known of the goods besides is told by sensor reports, too
-    (`value_reports`): the standard has ILMD only in events that add an object.  The creation date is that of
-    the newest look: the same inventory gives the same document.  InputError for a `gln` that is none, or a
+    nobody looked at has none.  What is known of the goods and of the place besides is told by sensor reports,
+    too (`value_reports`): the standard has ILMD only in events that add an object.  The creation date is that
+    of the newest look: the same inventory gives the same document.  InputError for a `gln` that is none, or a
     location code that cannot extend it.
     """
     looked = [(record, record.observation) for record in records if record.observation]
@@ -91,6 +91,7 @@ def _event(
     if classes:
         event["quantityList"] = [{"epcClass": uri} for uri in sorted(classes)]
     reports = value_reports(seen, things, base_uri, least_confidence)
+    reports += place_reports(record, seen, base_uri)
     if not instances and not classes:
         reports.insert(0, {"type": f"{base_uri}location_state", "stringValue": seen.state.value})
     if reports:

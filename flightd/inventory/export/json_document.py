@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from typing import Any
 
 from flightd.core.inventory import LocationRecord, Observation, PlaceFill
 from flightd.core.label_values import LEAST_CONFIDENCE, PlaceValue, told_number
@@ -18,6 +19,8 @@ def location_json(record: LocationRecord, least_confidence: float = LEAST_CONFID
         "location": record.code,
         "state": record.state.value,
         "node": record.node,
+        "pallets_deep": record.pallets_deep,
+        "pallets_seen": record.pallets_seen,
         "texts": list(record.texts),
         "values": [_value_json(value) for value in place_values(seen, least_confidence)],
         "observation": observation_json(seen, least_confidence) if seen else None,
@@ -57,9 +60,15 @@ def observation_json(seen: Observation, least_confidence: float = LEAST_CONFIDEN
     }
 
 
-def fill_json(fill: PlaceFill) -> dict[str, float | None]:
-    """How full a place is; null for what the pictures do not tell."""
-    return {"share": fill.share, "overhang_m": fill.overhang_m, "lean_m": fill.lean_m}
+def fill_json(fill: PlaceFill) -> dict[str, Any]:
+    """How full a place is, and the cases in its front; null for what the pictures do not tell."""
+    cases = fill.cases
+    return {
+        "share": fill.share,
+        "overhang_m": fill.overhang_m,
+        "lean_m": fill.lean_m,
+        "cases": cases and {"columns": cases.columns, "rows": cases.rows, "count": cases.count},
+    }
 
 
 def _value_json(stands: PlaceValue) -> dict[str, object]:

@@ -12,9 +12,11 @@ from flightd.core.utc_time import utc_text
 from flightd.inventory.export.value_columns import UNKNOWN, VALUE_COLUMNS, value_cells
 from flightd.inventory.place_values import code_values, place_values
 
+FILL_COLUMNS: Final = ("fill", "overhang_m", "lean_m", "cases", "case_columns", "case_rows")
+DEPTH_COLUMNS: Final = ("pallets_deep", "pallets_seen")
 COLUMNS: Final = (
     "location", "state", "text", "symbology", "gs1", "confidence", "utc", "run", "node", "x_m", "y_m",
-    "height_m", "evidence", *VALUE_COLUMNS, "fill", "overhang_m", "lean_m",
+    "height_m", "evidence", *VALUE_COLUMNS, *FILL_COLUMNS, *DEPTH_COLUMNS,
 )  # fmt: skip
 
 
@@ -42,21 +44,23 @@ def rows_of(
                     seen.confidence if seen else "", utc_text(seen.utc_ns) if seen else "",
                     seen.run if seen else "", record.node, pose.x_m if pose else "",
                     pose.y_m if pose else "", pose.height_m if pose else "", seen.evidence if seen else "",
-                    *value_cells(values), *_fill_cells(seen),
+                    *value_cells(values), *fill_cells(seen), record.pallets_deep,
+                    record.pallets_seen,
                 ]
             )  # fmt: skip
     return rows
 
 
-def _fill_cells(seen: Observation | None) -> list[str | float]:
-    """How full the place is, 0 to 1, the overhang, and how much goods lean; empty where it was not asked, and
-    nothing leans where nothing stands."""
+def fill_cells(seen: Observation | None) -> list[str | float]:
+    """A cell for each of `FILL_COLUMNS`: how full the place is, 0 to 1, the overhang, how much goods lean,
+    the cases in the front; empty where it was not asked, and nothing leans where nothing stands."""
     if seen is None or seen.fill is None:
-        return ["", "", ""]
+        return [""] * len(FILL_COLUMNS)
     share, overhang_m, lean_m = seen.fill.share, seen.fill.overhang_m, seen.fill.lean_m
-    unknown = "" if share == 0.0 else UNKNOWN
+    unknown, cases = "" if share == 0.0 else UNKNOWN, seen.fill.cases
     return [
         UNKNOWN if share is None else share,
         "" if overhang_m is None else overhang_m,
         unknown if lean_m is None else lean_m,
+        *((cases.count, cases.columns, cases.rows) if cases else (unknown, "", "")),
     ]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from flightd.core.inventory import LocationRecord, LocationState
 from flightd.replay.report.markup import element, text
-from flightd.replay.report.stock import CountedStock, fill_text, share
+from flightd.replay.report.stock import CountedStock, cases_text, fill_text, share
 from flightd.site.site import Location, Side, Site
 
 _HALF_COLUMNS = 30
@@ -120,6 +120,8 @@ def cell(record: LocationRecord, outcome: str) -> str:
         parts.append(share(seen.confidence))
         if seen.fill is not None and seen.fill.share is not None:
             parts.append(f"{fill_text(seen.fill)} filled")
+        if cases := cases_text(seen.fill):
+            parts.append(f"cases: {cases}")
     if outcome:
         parts.append(outcome.replace("_", " "))
     return element(

@@ -113,6 +113,12 @@ def fill_text(fill: PlaceFill | None) -> str:
     return f"{100.0 * fill.share:.0f} %{out}{aside}"
 
 
+def cases_text(fill: PlaceFill | None) -> str:
+    """The cases that are seen in the front, for people; an empty text where they are not known."""
+    cases = fill.cases if fill else None
+    return f"{cases.count} ({cases.columns} by {cases.rows}) in the front" if cases else ""
+
+
 _LEANS_M = 0.02
 """Goods that lean less are not said to lean: it is measured to about a centimetre."""
 _ROUNDING = 1e-9

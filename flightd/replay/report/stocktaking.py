@@ -17,7 +17,7 @@ from flightd.inventory.export.value_columns import value_text
 from flightd.inventory.place_values import place_values
 from flightd.replay.report.markup import NOTHING, element, table, text
 from flightd.replay.report.racks import STATE_NAMES, racks_section
-from flightd.replay.report.stock import SETTLED, CountedStock, fill_text, share
+from flightd.replay.report.stock import SETTLED, CountedStock, cases_text, fill_text, share
 from flightd.site.site import Site
 from flightd.vision.jpeg import decoded_jpeg
 
@@ -190,6 +190,7 @@ def _look(record: LocationRecord, outcome: str) -> dict[str, object]:
             ("Values", ", ".join(value_text(value).replace("_", " ") for value in place_values(seen))),
             ("Confidence", share(seen.confidence) if seen else ""),
             ("Filled", fill_text(seen.fill) if seen else ""),
+            ("Cases", cases_text(seen.fill) if seen else ""),
             ("Looked at", f"{_when(seen.utc_ns)} UTC" if seen else ""),
             ("From node", (seen.pose.node if seen and seen.pose else record.node)),
             ("Height", f"{seen.pose.height_m:.2f} m" if seen and seen.pose else ""),

@@ -10,12 +10,12 @@ from flightd.sim.racks.stock import StockShares
 
 @dataclass(frozen=True, slots=True)
 class RackAppearance:
-    """`shares` of the places; `in_part` of those with goods are filled only in part, in stacks; `seed` of the
-    goods, the flight's own when None; `location_labels` hangs a small label with each location's code on the
-    beam below it.  `noise` is the standard deviation in grey
-    levels at mid grey, `soft_px` the sigma of the lens blur, `exposure` scales the brightness, `flicker`
-    is the share of it that beats with the mains; `light` is a factor on it by rack front ("A left") or by a
-    level of one ("A left 2")."""
+    """`shares` of the places; `in_part` of those with goods are filled only in part, in stacks, and of the
+    others `cartons` hold cartons of one kind, most of them regularly stacked; `seed` of the goods, the
+    flight's own when None; `location_labels` hangs a small label with each location's code on the beam below
+    it.  `noise` is the standard deviation in grey levels at mid grey, `soft_px` the sigma of the lens blur,
+    `exposure` scales the brightness, `flicker` is the share of it that beats with the mains; `light` is a
+    factor on it by rack front ("A left") or by a level of one ("A left 2")."""
 
     shares: StockShares = field(default_factory=StockShares)
     seed: int | None = None
@@ -26,5 +26,6 @@ class RackAppearance:
     exposure: float = 1.0
     flicker: float = 0.01
     in_part: float = 0.0
+    cartons: float = 0.0
     motion_blur: bool = True
     light: Mapping[str, float] = field(default_factory=dict)

@@ -54,7 +54,7 @@ class FrontRenderer:
         self._camera = camera
         focal_px = camera.lens.fx_px
         stock_seed = seed if look.seed is None else look.seed
-        places = stock(site, look.shares, focal_px, stock_seed, look.in_part)
+        places = stock(site, look.shares, focal_px, stock_seed, look.in_part, look.cartons)
 
         def density(code: str) -> float | None:
             location = site.locations[code]

@@ -8,8 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flightd.sim.racks.cartons import CartonStack
 from flightd.sim.racks.rack_layout import DEPTH_M, Opening
 
+PALLET_M = 0.10
+BARE_M = 0.35
+"""Goods that are no higher stand on none."""
 _LEAST_WIDTH_M = 0.12
 _LEAST_HEIGHT_M = 0.06
 _WIDTHS, _HEIGHTS = (0.2, 0.96), (0.15, 0.94)
@@ -25,7 +29,8 @@ class Goods:
     """What stands in a place: a front of this size whose middle is `right_m` of the opening's, `recess_m`
     behind the rack's face (before it where negative).  `covered` hangs a sheet before it, `dark` is dark and
     matte all over; `looks` seeds everything else.  `depth_m` is how deep it is, None up to the rack's back;
-    its top is `lean_m` to the right of its foot.  `beside` are the other stacks of the place."""
+    its top is `lean_m` to the right of its foot.  `cartons` are a stack of one kind, None for anything else.
+    `beside` are the other stacks of the place."""
 
     width_m: float
     height_m: float
@@ -36,6 +41,7 @@ class Goods:
     dark: bool = False
     depth_m: float | None = None
     lean_m: float = 0.0
+    cartons: CartonStack | None = None
     beside: tuple[Goods, ...] = ()
 
     @property
@@ -43,9 +49,21 @@ class Goods:
         """Everything that stands in the place."""
         return (self, *self.beside)
 
+    @property
+    def filled_m(self) -> float:
+        """The height of its front, less what is missing of its highest row."""
+        if self.cartons is None:
+            return self.height_m
+        return self.height_m - self.load_m * (1.0 - self.cartons.share)
+
+    @property
+    def load_m(self) -> float:
+        """The height of what stands on its pallet; low goods have none."""
+        return self.height_m - (PALLET_M if self.height_m > BARE_M else 0.0)
+
     def share_of(self, opening: Opening) -> float:
         """The part of the opening's front, 0..1, that goods stand in."""
-        filled = sum(stack.width_m * stack.height_m for stack in self.stacks)
+        filled = sum(stack.width_m * stack.filled_m for stack in self.stacks)
         return filled / (opening.width_m * opening.level.height_m)
 
 

@@ -10,11 +10,12 @@ import enum
 import math
 import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from flightd.core.inventory import LocationState
+from flightd.sim.racks.cartons import carton_stack
 from flightd.sim.racks.code_symbols import Symbol, Symbology, modules
 from flightd.sim.racks.label_texts import (
     Numbers,
@@ -197,10 +198,16 @@ class StockPlace:
 
 
 def stock(
-    site: Site, shares: StockShares, focal_px: float, seed: int, in_part: float = 0.0
+    site: Site,
+    shares: StockShares,
+    focal_px: float,
+    seed: int,
+    in_part: float = 0.0,
+    cartons: float = 0.0,
 ) -> Mapping[str, StockPlace]:
     """What is at every location of the site, by its code, in the order of the map; `in_part` is the part of
-    the places with goods that they fill only in part."""
+    the places with goods that they fill only in part, `cartons` that of the others, in the light, where
+    cartons of one kind are stacked."""
     found = {}
     order = {code: number for number, code in enumerate(site.locations)}
     numbers = Numbers(seed)
@@ -209,7 +216,7 @@ def stock(
         distance_m = max(abs(location.y_m - site.nodes[location.node].y_m), 0.1)
         rng = np.random.default_rng([seed, zlib.crc32(location.code.encode()), 0x73746F63])
         serial = numbers.of(order[location.code])
-        found[location.code] = _place(opening, shares, focal_px / distance_m, serial, rng, in_part)
+        found[location.code] = _place(opening, shares, focal_px / distance_m, serial, rng, in_part, cartons)
     return {code: found[code] for code in site.locations}
 
 
@@ -220,6 +227,7 @@ def _place(
     serial: tuple[int, int],
     rng: np.random.Generator,
     in_part: float,
+    cartons: float,
 ) -> StockPlace:
     situation = shares.situation(float(rng.random()))
     if situation is StockSituation.EMPTY:
@@ -235,6 +243,8 @@ def _place(
     fills = np.random.default_rng([looks, 0x66696C6C])  # of its own: the rest of the place stays as it is
     if fills.random() < in_part:
         goods = in_stacks(goods, opening, fills)
+    elif not dark and fills.random() < cartons:
+        goods = replace(goods, cartons=carton_stack((goods.width_m, goods.load_m), fills))
     if situation in _UNLABELLED:
         return StockPlace(opening, situation, goods, ())
     condition = _CONDITIONS.get(situation, Condition.CLEAN)

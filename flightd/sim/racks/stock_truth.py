@@ -10,6 +10,7 @@ from typing import Any
 
 from flightd.core.inventory import LocationRecord, LocationState
 from flightd.sim.racks.appearance import RackAppearance
+from flightd.sim.racks.goods import boxes_in_rows
 from flightd.sim.racks.stock import StockPlace, StockSituation, stock
 from flightd.site.site import Site
 
@@ -31,8 +32,9 @@ class LabelTruth:
 
 @dataclass(frozen=True, slots=True)
 class LocationTruth:
-    """One location: the state that a perfect count gives it, its labels, and `fill`, the part of its
-    opening that goods stand in as seen straight from before it, 0..1."""
+    """One location: the state that a perfect count gives it, its labels, `fill`, the part of its
+    opening that goods stand in as seen straight from before it, 0..1, and `boxes`, how many are seen in each
+    row of its front, the highest first: none where there are none, or something else beside them."""
 
     code: str
     node: str
@@ -40,6 +42,7 @@ class LocationTruth:
     situation: str
     labels: tuple[LabelTruth, ...]
     fill: float = 0.0
+    boxes: tuple[int, ...] = ()
 
     @property
     def texts(self) -> frozenset[str]:
@@ -61,7 +64,8 @@ class StockScore:
     place).  `empty_*`: places without goods, those said to be so, and others said to be so.
     `unreadable_*`: places whose labels cannot be read (torn, too small, missing, covered), and those told
     as unreadable or occluded.  `locations_right` have exactly the state of a perfect count.  `fill_told`:
-    places of which it was told how full they are, `fill_right` of these within 10 points of the truth."""
+    places of which it was told how full they are, `fill_right` of these within 10 points of the truth;
+    `cases_told`: those of which cases were counted, `cases_right` of these as they stand in the front."""
 
     locations_planned: int
     locations_visited: int
@@ -76,6 +80,8 @@ class StockScore:
     unreadable_told: int
     fill_told: int
     fill_right: int
+    cases_told: int
+    cases_right: int
 
     def as_summary(self) -> dict[str, int]:
         return {field.name: getattr(self, field.name) for field in fields(self)}
@@ -84,7 +90,7 @@ class StockScore:
 def stock_truth(site: Site, look: RackAppearance, focal_px: float, seed: int) -> dict[str, LocationTruth]:
     """The truth of every location of the site, by its code; `seed` is the flight's."""
     stock_seed = seed if look.seed is None else look.seed
-    places = stock(site, look.shares, focal_px, stock_seed, look.in_part)
+    places = stock(site, look.shares, focal_px, stock_seed, look.in_part, look.cartons)
     return {code: _truth(place) for code, place in places.items()}
 
 
@@ -101,8 +107,20 @@ def _truth(place: StockPlace) -> LocationTruth:
     location = place.opening.location
     situation = place.situation
     return LocationTruth(
-        location.code, location.node, situation.state, situation.value, labels, round(place.fill, 3)
+        location.code,
+        location.node,
+        situation.state,
+        situation.value,
+        labels,
+        round(place.fill, 3),
+        boxes_of(place),
     )
+
+
+def boxes_of(place: StockPlace) -> tuple[int, ...]:
+    """How many boxes are seen in each row of a place, the highest first."""
+    goods = place.goods
+    return boxes_in_rows(goods) if goods is not None and not goods.beside and not goods.covered else ()
 
 
 def score_stock(
@@ -131,11 +149,12 @@ def score_stock(
     empty = [place for place in asked if place.situation == StockSituation.EMPTY]
     unknown = [place for place in asked if place.state in _UNKNOWN]
     fills = [
-        (record.observation.fill.share, place.fill)
+        (record.observation.fill, place)
         for place in asked
         if (record := found.get(place.code)) and record.observation and record.observation.fill
     ]
-    shares = [(share, true) for share, true in fills if share is not None]
+    shares = [(fill.share, place.fill) for fill, place in fills if fill.share is not None]
+    cases = [(fill.cases, place.boxes) for fill, place in fills if fill.cases is not None]
     said_empty = [code for code, state in told.items() if state is LocationState.EMPTY]
     return StockScore(
         locations_planned=len(asked),
@@ -151,6 +170,8 @@ def score_stock(
         unreadable_told=sum(told[place.code] in _UNKNOWN for place in unknown),
         fill_told=len(shares),
         fill_right=sum(abs(share - true) <= _SAME_FILL for share, true in shares),
+        cases_told=len(cases),
+        cases_right=sum(boxes == (grid.columns,) * grid.rows for grid, boxes in cases),
     )
 
 
@@ -167,6 +188,7 @@ def _row(place: LocationTruth) -> dict[str, Any]:
         "state": place.state.value,
         "situation": place.situation,
         "fill": place.fill,
+        "boxes": place.boxes,
         "labels": [
             {"symbology": label.symbology, "text": label.text, "condition": label.condition}
             for label in place.labels

@@ -28,6 +28,7 @@ too_small = 0.02
 missing = 0.03           # goods without a label
 occluded = 0.03          # a sheet hangs before the goods
 in_part = 0.0            # part of the places with goods that they fill only in part, in stacks
+cartons = 0.0            # part of the others where cartons of one kind are stacked, most of them regularly
 location_labels = true   # each location's code on the beam below it
 seed = 1                 # of the goods; left out: the flight's
 noise = 2.0              # grey levels at mid grey
@@ -151,6 +152,7 @@ class RacksScenario(Section):
     occluded: float = Field(_USUAL.occluded, ge=0, le=1)
     dark: float = Field(_USUAL.dark, ge=0, le=1)
     in_part: float = Field(0.0, ge=0, le=1)
+    cartons: float = Field(0.0, ge=0, le=1)
     location_labels: bool = True
     seed: int | None = Field(None, ge=0)
     noise: float = Field(2.0, ge=0, le=20)
@@ -173,6 +175,7 @@ class RacksScenario(Section):
             noise=self.noise,
             exposure=self.exposure,
             in_part=self.in_part,
+            cartons=self.cartons,
             light=self.light,
         )
 

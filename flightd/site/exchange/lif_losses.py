@@ -45,6 +45,8 @@ def _lost(site: Site, again: Site) -> Iterator[str]:
     yield from _named("rack", [code for code in site.locations if not _place_held(code, site, again)])
     if any(rack.deck_below_label_m is not None for rack in site.racks):
         yield "rack.deck_below_label_m"
+    if any(rack.pallets_deep > 1 for rack in site.racks):
+        yield "rack.pallets_deep"
     yield from _fields_lost("pad", _by_id(site.pads), _by_id(again.pads))
     yield from _named("marker", [str(marker.id) for marker in site.markers])
 
@@ -72,7 +74,8 @@ def _place_held(code: str, site: Site, again: Site) -> bool:
     if code not in again.locations:
         return False
     one, two = site.locations[code], again.locations[code]
-    return all(_same(getattr(one, field.name), getattr(two, field.name)) for field in fields(Location))
+    told = (field.name for field in fields(Location) if field.name != "pallets_deep")  # of its rack
+    return all(_same(getattr(one, name), getattr(two, name)) for name in told)
 
 
 def _same(one: Any, two: Any) -> bool:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from flightd.core.inventory import PlaceFill
 from flightd.core.scanning import PlaceOpening
 from flightd.core.types import Image
+from flightd.vision.shelf.case_grid import case_grid
 from flightd.vision.shelf.deck_sight import deck_sight
 from flightd.vision.shelf.front_depth import FrontDepths
 from flightd.vision.shelf.front_lean import front_lean_m
@@ -141,6 +142,7 @@ def measure(
     colours = np.maximum(raster[deck + round(CLEAR_M / ROW_M) :, columns], 1).astype(np.float32) / white
     area, doubt, out_m = 0.0, 0.0, 0.0
     leans_m: list[float | None] = []
+    cases = case_grid(square, white, np.where(tops_m >= _GOODS_M, tops_m, 0.0), left, codes_m)
     runs = equal_runs(tops_m)
     for number, (start, stop) in enumerate(runs):
         if tops_m[start] < LOW_M:
@@ -162,9 +164,10 @@ def measure(
         doubt += width * COLUMN_M * perhaps_m
     whole_m2 = opening.width_m * opening.height_m
     if doubt > _DOUBT_PART * whole_m2:
-        return OpeningLook(PlaceFill(None), is_clear)
+        return OpeningLook(PlaceFill(None, cases=cases), is_clear)
     share = min(area / whole_m2, 1.0)
-    return OpeningLook(PlaceFill(round(share, 3), round(out_m, 3) or None, _most_m(leans_m)), is_clear)
+    fill = PlaceFill(round(share, 3), round(out_m, 3) or None, _most_m(leans_m), cases)
+    return OpeningLook(fill, is_clear)
 
 
 def _most_m(leans_m: Sequence[float | None]) -> float | None:

@@ -53,3 +53,17 @@ def test_how_full_places_are_is_told_within_ten_points() -> None:
     assert len(known) >= 0.7 * len(told) >= 8
     assert sum(abs(share - true) <= 0.1 for true, share in known) >= 0.9 * len(known)
     assert max(true for true, _ in known) - min(true for true, _ in known) > 0.3
+
+
+def test_cases_are_counted_in_regular_stacks_and_nowhere_else() -> None:
+    look = replace(RackAppearance(), shares=StockShares(empty=0.05), cartons=0.8)
+    assigner = Assigner(SITE, FrontSight(CAMERA.lens, CAMERA.mount))
+    truth = stock_truth(SITE, look, CAMERA.lens.fx_px, SEED)
+    told = []
+    for seen in shelf_pictures(SITE, CAMERA, look, SEED, ("A2", "B3")):
+        codes, _ = read_shelf(seen.picture, 0, 0, assigner.places(seen.pose, seen.view.locations))
+        told += [(truth[place.location].boxes, place.fill) for place in codes.places]
+    counted = [(boxes, fill.cases) for boxes, fill in told if fill is not None and fill.cases is not None]
+    plain = [boxes for boxes, _ in told if len(boxes) > 1 and boxes[0] > 1 and len(set(boxes)) == 1]
+    assert len(counted) >= 0.4 * len(plain) >= 1.2
+    assert all(boxes == (grid.columns,) * grid.rows for boxes, grid in counted)

@@ -7,6 +7,7 @@ import io
 import json
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -22,9 +23,9 @@ from flightd.app.recording import FlightSetting, record_setting
 from flightd.cli.main import app
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
-from flightd.core.inventory import LocationState, Observation, PlannedLocation
+from flightd.core.inventory import CaseGrid, LocationState, Observation, PlaceFill, PlannedLocation
 from flightd.site.site_file import load_site
-from tests.unit.cli.inventory_commands import RUNNER, counted_store, error_of, run
+from tests.unit.cli.inventory_commands import RUNNER, code, counted_store, error_of, look, run
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 
@@ -64,6 +65,18 @@ def test_photographs_become_an_inventory_and_again_change_nothing(tmp_path: Path
     evidence = store / "evidence" / look["evidence"][:2] / f"{look['evidence']}.jpg"
     assert 0 < evidence.stat().st_size <= 50_000
     assert "3 locations: 1 read, 1 several, 1 unreadable" in run("show", store)
+
+
+def test_what_is_known_of_the_goods_stands_beside_the_codes(tmp_path: Path) -> None:
+    gs1 = code("x", "Data Matrix", a01="09501101530003", a10="L1", a17="261130")
+    with SqliteStore(tmp_path) as store:
+        store.plan([PlannedLocation("A-01", "A1", 2), PlannedLocation("A-02", "A1")])
+        fill = PlaceFill(0.62, cases=CaseGrid(4, 3))
+        store.commit(replace(look("A-01", 1, gs1), fill=fill))
+        store.commit(replace(look("A-02", 2, state="empty"), fill=PlaceFill(0.0)))
+    lines = run("show", tmp_path).splitlines()
+    known = "lot L1  expiry 2026-11-30  fill 62 %  cases 4 x 3  1 of 2 pallets seen"
+    assert lines[:2] == [f"A-01             read         x  {known}", "A-02             empty"]
 
 
 @pytest.fixture

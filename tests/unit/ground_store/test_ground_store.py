@@ -14,6 +14,7 @@ import pytest
 
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
+    CaseGrid,
     CountPose,
     LocationState,
     Observation,
@@ -72,11 +73,14 @@ def test_what_was_taken_is_there_when_it_is_opened_again(
 ) -> None:
     evidence = FolderEvidence(tmp_path / "evidence")
     with GroundStore(engine(), evidence) as first:
-        first.take(batch(look("A-1", "PAL-1"), places=(PlannedLocation("A-2", "A7"),)))
+        first.take(batch(look("A-1", "PAL-1"), places=(PlannedLocation("A-2", "A7", 2),)))
     with GroundStore(engine(), evidence) as second:
         assert second.id == first.id
         assert places_of(second) == {"A-1": ("read", ["PAL-1"], "monday"), "A-2": ("not_visited", [], None)}
         assert second.stock(SITE)[1]["node"] == "A7"
+        assert [row["pallets_deep"] for row in second.stock(SITE)] == [1, 2]
+        second.take(batch(places=(PlannedLocation("A-2", "A7", 3),)))
+        assert second.stock(SITE)[1]["pallets_deep"] == 3
 
 
 def test_a_look_comes_back_as_it_was_seen(store: GroundStore) -> None:
@@ -91,8 +95,13 @@ def test_a_look_comes_back_as_it_was_seen(store: GroundStore) -> None:
 
 def test_how_full_a_place_is_stands_with_its_look_and_its_place(store: GroundStore) -> None:
     fills = {
-        PlaceFill(0.625, 0.04, 0.03): {"share": 0.625, "overhang_m": 0.04, "lean_m": 0.03},
-        PlaceFill(None): {"share": None, "overhang_m": None, "lean_m": None},
+        PlaceFill(0.625, 0.04, 0.03, CaseGrid(4, 3)): {
+            "share": 0.625,
+            "overhang_m": 0.04,
+            "lean_m": 0.03,
+            "cases": {"columns": 4, "rows": 3, "count": 12},
+        },
+        PlaceFill(None): {"share": None, "overhang_m": None, "lean_m": None, "cases": None},
         None: None,
     }
     for day, fill in enumerate(fills):
@@ -366,9 +375,16 @@ def test_a_store_from_before_places_told_how_full_they_are_is_taken_over(
         session.run("INSERT INTO place (site, code, node, state) VALUES (1, ?, ?, ?)", "A-1", "A1", "empty")
     older.close()
     with GroundStore(engine(), FolderEvidence(tmp_path / "evidence")) as store:
-        assert [(row["state"], row["fill"]) for row in store.stock(SITE)] == [("empty", None)]
+        assert [(row["state"], row["fill"], row["pallets_deep"]) for row in store.stock(SITE)] == [
+            ("empty", None, 1)
+        ]
         store.take(batch(look("A-1", "PAL-1", fill=PlaceFill(0.5))))
-        assert store.stock(SITE)[0]["fill"] == {"share": 0.5, "overhang_m": None, "lean_m": None}
+        assert store.stock(SITE)[0]["fill"] == {
+            "share": 0.5,
+            "overhang_m": None,
+            "lean_m": None,
+            "cases": None,
+        }
 
 
 def test_a_database_that_cannot_be_had_is_told_in_a_line(tmp_path: Path) -> None:
@@ -391,7 +407,7 @@ def _asked(question: str) -> list[tuple[Any, ...]]:
 
 
 def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> None:
-    half, unknown = PlaceFill(0.5, 0.04, 0.03), PlaceFill(None)
+    half, unknown = PlaceFill(0.5, 0.04, 0.03, CaseGrid(4, 3)), PlaceFill(None)
     pending = look("A-2", standing=Standing.PENDING, fill=unknown)
     store.take(batch(look("A-1", 'a"b,\n', run="monday"), pending))
     store.take(batch(look("A-1", run="tuesday", at_ns=_BEGIN + _DAY + 7), look("A-9", "x", fill=half)))
@@ -410,11 +426,12 @@ def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> No
     assert (told[0][:2], told[0][5], json.loads(told[0][6])[0][1]) == ((SITE, "monday"), None, 'a"b,\n')
     assert json.loads(told[2][6])[0][1] == "x"
     filled = _asked(
-        f"SELECT fill_asked, fill, overhang_m, lean_m FROM '{observations}' ORDER BY utc, location"
+        "SELECT fill_asked, fill, overhang_m, lean_m, case_columns, case_rows"
+        f" FROM '{observations}' ORDER BY utc, location"
     )
+    nothing = (None,) * 5
     assert filled == [
-        (False, None, None, None), (True, None, None, None), (True, 0.5, 0.04, 0.03),
-        (False, None, None, None),
+        (False, *nothing), (True, *nothing), (True, 0.5, 0.04, 0.03, 4, 3), (False, *nothing),
     ]  # fmt: skip
     changed = _asked(f"SELECT location, change, before_texts FROM '{differences}'")
     assert changed == [("A-1", "gone", json.dumps(['a"b,\n']))]

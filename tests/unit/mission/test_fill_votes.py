@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from flightd.core.inventory import LocationState, PlaceFill
+from flightd.core.inventory import CaseGrid, LocationState, PlaceFill
 from flightd.mission.scan.fill_votes import FillVotes
 
 READ, EMPTY = LocationState.READ, LocationState.EMPTY
@@ -79,3 +79,21 @@ def test_an_overhang_is_told_where_most_pictures_show_it() -> None:
     assert votes.together(READ) == PlaceFill(0.5, 0.06)
     votes.add(PlaceFill(0.5))
     assert votes.together(READ) == PlaceFill(0.5)
+
+
+def cases(state: LocationState, *grids: CaseGrid | None) -> CaseGrid | None:
+    votes = FillVotes()
+    for grid in grids:
+        votes.add(PlaceFill(0.5, cases=grid))
+    fill = votes.together(state)
+    return fill.cases if fill else None
+
+
+def test_cases_are_told_where_several_pictures_do_and_none_tells_others() -> None:
+    three, four = CaseGrid(3, 2), CaseGrid(4, 2)
+    assert cases(READ, three, None, three) == three
+    assert cases(LocationState.UNREADABLE, three, three) == three
+    assert cases(READ, three, None, None) is None
+    assert cases(READ, three, three, three, four) is None
+    assert cases(EMPTY, three, three) is None
+    assert cases(LocationState.OCCLUDED, three, three) is None

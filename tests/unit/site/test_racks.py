@@ -118,6 +118,7 @@ def test_racks_without_aisles_take_every_aisle_with_such_shelves() -> None:
         ("aisles = ['A']\nbay_width_m = 1\nlevels_m = [1]\npattern = '{side:2}'", "letters take no width"),
         ("aisles = ['A']\nbay_width_m = 1\nlevel = [1]", "rack[0].level: unknown key"),
         ("aisles = ['A']\nbay_width_m = 1\nlevels_m = [nan]", "rack[0].levels_m[0]"),
+        ("aisles = ['A']\nbay_width_m = 1\nlevels_m = [1]\npallets_deep = 0", "rack[0].pallets_deep"),
     ],
 )
 def test_mistakes_are_named_in_one_line(rack: str, words: str) -> None:
@@ -125,6 +126,14 @@ def test_mistakes_are_named_in_one_line(rack: str, words: str) -> None:
         hall("[[rack]]\n" + rack + "\n")
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_how_many_pallets_stand_behind_one_another_is_kept_with_each_place() -> None:
+    site = hall(RACK.replace("[[rack]]", "[[rack]]\npallets_deep = 3"))
+    assert {place.pallets_deep for place in site.locations.values()} == {3}
+    assert parse_site(site_toml(site), "again").locations == site.locations
+    assert {place.pallets_deep for place in hall(RACK).locations.values()} == {1}
+    assert "pallets_deep" not in site_toml(hall(RACK))
 
 
 def test_one_front_belongs_to_one_rack() -> None:

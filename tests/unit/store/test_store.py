@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import LocationState, Observation, PlaceFill, PlannedLocation, Standing
+from flightd.core.inventory import CaseGrid, LocationState, Observation, PlaceFill, PlannedLocation, Standing
 from flightd.core.types import CodeRead
 from flightd.ports import Store
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
@@ -39,6 +39,16 @@ def test_planned_locations_are_not_visited_until_somebody_looks(tmp_path: Path) 
     assert (found["A-02"].state, found["A-02"].observation) == (LocationState.NOT_VISITED, None)
 
 
+def test_how_deep_places_are_follows_the_newest_plan_and_is_merged(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path / "one") as store, SqliteStore(tmp_path / "two") as other:
+        store.plan([PlannedLocation("A-01", "A1", 2)])
+        store.plan([PlannedLocation("A-01", "A1", 3), PlannedLocation("A-02", "A1")])
+        store.commit(look(1))
+        other.merge(store)
+        for one in (store, other):
+            assert [(r.pallets_deep, r.pallets_seen) for r in one.locations()] == [(3, 1), (1, 0)]
+
+
 def test_what_was_committed_is_read_back_as_it_was(tmp_path: Path) -> None:
     elements = (("01", "09501101530003"),)
     gs1 = CodeRead("Code 128", "0109501101530003", (), True, 3, 0.75, elements, module_px=2.9)
@@ -53,7 +63,16 @@ def test_what_was_committed_is_read_back_as_it_was(tmp_path: Path) -> None:
         assert [observation.id for observation in store.history("A-02")] == [seen.id]
 
 
-@pytest.mark.parametrize("fill", [PlaceFill(0.625, 0.04, 0.03), PlaceFill(0.0), PlaceFill(None), None])
+@pytest.mark.parametrize(
+    "fill",
+    [
+        PlaceFill(0.625, 0.04, 0.03, CaseGrid(4, 3)),
+        PlaceFill(None, cases=CaseGrid(2, 2)),
+        PlaceFill(0.0),
+        PlaceFill(None),
+        None,
+    ],
+)
 def test_how_full_a_place_is_is_read_back_as_it_was_and_merged(
     tmp_path: Path, fill: PlaceFill | None
 ) -> None:
@@ -277,11 +296,23 @@ def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path:
         assert [kept.id for kept in other.history(seen.location)] == [seen.id]
 
 
-TO_5 = ("ALTER TABLE observation DROP COLUMN again",)
+TO_6 = (
+    "ALTER TABLE place_fill DROP COLUMN case_columns",
+    "ALTER TABLE place_fill DROP COLUMN case_rows",
+    "ALTER TABLE location DROP COLUMN pallets_deep",
+)
+TO_5 = (*TO_6, "ALTER TABLE observation DROP COLUMN again")
 TO_4 = (*TO_5, "ALTER TABLE place_fill DROP COLUMN lean_m")
-TO_3 = (*TO_5, "DROP TABLE place_fill")
+TO_3 = (*TO_5[2:], "DROP TABLE place_fill")
 TO_2 = (*TO_3, "ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
-OLDER = {1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"), 2: TO_2, 3: TO_3, 4: TO_4, 5: TO_5}
+OLDER = {
+    1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"),
+    2: TO_2,
+    3: TO_3,
+    4: TO_4,
+    5: TO_5,
+    6: TO_6,
+}
 
 
 @pytest.mark.parametrize("version", OLDER)
