@@ -120,14 +120,14 @@ class OscillationMonitor:
         settles = self._found_ns is not None and now_ns - self._found_ns < _SETTLES_NS
         self.swings = settles or (self.swings and now_ns - self._fast_ns < _RESTS_NS)
         if (swings_x or swings_y) and not settles:
-            self._slow_down(now_ns)
+            peaks_mps = along_x.peak_mps * swings_x, along_y.peak_mps * swings_y
+            self._slow_down(now_ns, max(peaks_mps))
         if self.swings or self._calm_since_ns is None:
             self._calm_since_ns = now_ns
         elif self.ease < self._most and now_ns - self._calm_since_ns > _CALM_NS:
             self.ease, self._calm_since_ns, self._tried = min(self.ease / _EASED, self._most), now_ns, True
 
-    def _slow_down(self, now_ns: int) -> None:
-        peak_mps = max(axis.peak_mps for axis in self._axes)
+    def _slow_down(self, now_ns: int, peak_mps: float) -> None:
         if peak_mps > _WILD_MPS:
             self.ease = _LEVEL_EASE if self.ease <= LEAST_EASE else LEAST_EASE
         else:

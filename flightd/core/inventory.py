@@ -173,7 +173,8 @@ class LocationRecord:
     @property
     def pallets_seen(self) -> int:
         """Of the pallets behind one another, how many the look shows: the first, or none."""
-        return int(self.state not in {LocationState.NOT_VISITED, LocationState.OCCLUDED})
+        nothing = LocationState.NOT_VISITED, LocationState.OCCLUDED, LocationState.EMPTY
+        return int(self.state not in nothing)
 
     @property
     def texts(self) -> tuple[str, ...]:

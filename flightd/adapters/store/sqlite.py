@@ -398,7 +398,11 @@ class SqliteStore:
         with self._transaction():
             before = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
             rows = [(location.code, location.node, location.pallets_deep) for location in planned]
-            self._db.executemany("INSERT OR IGNORE INTO location VALUES (?, ?, ?)", rows)
+            self._db.executemany(
+                "INSERT INTO location VALUES (?, ?, ?) ON CONFLICT (code) DO UPDATE"
+                " SET pallets_deep = max(pallets_deep, excluded.pallets_deep)",  # 1 may be: not known
+                rows,
+            )
             for observation, standing in seen:
                 self._insert(observation, standing)
             merge_texts(self._db, searched)

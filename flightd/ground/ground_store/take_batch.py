@@ -94,8 +94,8 @@ def _take_looks(
         pose = look.observation.pose
         nodes.setdefault(look.observation.location, pose.node if pose else "")
     places = _places(session, site, nodes)
-    session.run_many(
-        "UPDATE place SET pallets_deep = ? WHERE id = ? AND pallets_deep <> ?",
+    session.run_many(  # the greatest, in whatever order they come: 1 may be of who does not know
+        "UPDATE place SET pallets_deep = ? WHERE id = ? AND pallets_deep < ?",
         [(deep, places[code], deep) for code, deep in depths.items()],
     )
     unique: dict[str, SentLook] = {}

@@ -294,13 +294,15 @@ class Itinerary:
         self._note_recount(now_ns, due)
 
     def recount_next(self, now_ns: int, due: Sequence[str]) -> None:
-        """Visit nodes again whose count was taken back, from the goal, at which the drone rests; one that is
-        led from node to node flies to none by itself."""
+        """Visit nodes again whose count was taken back, from the goal, at which the drone rests, as soon as
+        its aisle is done; one that is led from node to node flies to none by itself."""
         due = [node for node in due if node in self.visited]
         if not due or self._waits:
             return
         try:
-            rest = self._onward(self.goal, [*due, *self.ahead])
+            aisle = self._site.nodes[self.goal.node].aisle
+            here = list(itertools.takewhile(lambda node: self._site.nodes[node].aisle == aisle, self.ahead))
+            rest = self._onward(self.goal, [*here, *due, *self.ahead[len(here) :]])
         except NoWayError as err:
             self._leave_out(now_ns, due, err)
             return

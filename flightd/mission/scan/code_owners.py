@@ -40,11 +40,11 @@ class CodeOwners:
 
     def take(self, found: Finding) -> Contradiction | None:
         """What contradicts the finding, which is the place's own unless it is to be looked at again."""
-        texts = {read.text for read in found.reads if names_one_thing(read)}
+        # a text that hangs at two places surely names no single thing
+        texts = {read.text for read in found.reads if names_one_thing(read)} - self._at_many
         twice = {text for text in texts if self._places.get(text, set()) - {found.location}}
         others = {place for text in twice for place in self._places[text]} - {found.location}
-        # a text that hangs at two places surely names no single thing
-        again = set() if twice <= self._at_many else ({found.location} | others) - self._again
+        again = ({found.location} | others) - self._again if others else set()
         self._again |= again
         self._drop(again)
         if found.location not in again:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from flightd.core.scanning import Settled
@@ -28,7 +29,9 @@ class PendingFindings:
         self._nodes: list[_AtNode] = []
         self._settled: list[Settled] = []
         self._due: list[str] = []
+        self._recalled: list[str] = []
         self._again: Counter[str] = Counter()
+        self._reached = ""
 
     def arrive(self, node: str) -> None:
         """What is found from now on is found here."""
@@ -48,18 +51,19 @@ class PendingFindings:
         at.locations.append(location)
         at.stops = 0
 
-    def recall(self, location: str, node: str) -> None:
-        """What was found at one location counts no more, whether or not it is confirmed; its node is due
-        again."""
+    def recall(self, node_of: Mapping[str, str]) -> None:
+        """What was found at these locations counts no more, whether or not it is confirmed; their nodes are
+        due again, however often they were."""
         for at in self._nodes:
-            at.locations = [code for code in at.locations if code != location]
-        self._settled.append(Settled((location,), confirmed=False, booked=True))
-        self._due += [node] * (node not in self._due)
+            at.locations = [code for code in at.locations if code not in node_of]
+        self._settled.append(Settled(tuple(node_of), confirmed=False, booked=True))
+        self._recalled += node_of.values()
 
     def reached(self, node: str, present: str) -> None:
-        """Another certain stop: it proves what lies far enough back."""
+        """Another certain stop: it proves what lies far enough back.  The same again proves no more."""
         for at in self._nodes:
-            at.stops += at.node != node
+            at.stops += at.node != node != self._reached
+        self._reached = node
         self._confirm([at for at in self._nodes if at.stops >= self._confirm_stops], present)
 
     def confirm_at(self, node: str) -> None:
@@ -83,8 +87,17 @@ class PendingFindings:
         """The nodes to fly to once more, in the order of their first visit."""
         due = [node for node in self._due if self._again[node] < self._revisits]
         self._again.update(due)
+        due = list(dict.fromkeys([*due, *self._recalled]))
         self._due.clear()
+        self._recalled.clear()
         return tuple(due)
+
+    def begin(self) -> None:
+        """Another flight: no node of the one before is due, and each may be again."""
+        self._due.clear()
+        self._recalled.clear()
+        self._again.clear()
+        self._reached = ""
 
     def drain(self) -> tuple[Settled, ...]:
         """What was confirmed and withdrawn since the last call."""

@@ -165,6 +165,7 @@ class Scanner:
         self._done.clear()
         self._swept.clear()
         self._owners = CodeOwners()
+        self._pending.begin()
         self._begun = self._begun_blind = 0
 
     def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
@@ -485,10 +486,10 @@ class Scanner:
         against = self._owners.take(found)
         if against is None:
             return frozenset()
-        for place in against.again:
-            self._done.discard(place)
-            self._swept.add(place)
-            self._pending.recall(place, self._node_of[place])
+        if against.again:
+            self._done -= against.again
+            self._swept |= against.again
+            self._pending.recall({place: self._node_of[place] for place in sorted(against.again)})
         self._events.append(Event(found.stamp_ns, EventLevel.WARNING, "contradiction", str(against)))
         return against.again
 

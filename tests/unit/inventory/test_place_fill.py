@@ -77,7 +77,12 @@ def test_cases_are_said_as_what_is_seen_of_the_front() -> None:
 
 def test_exports_say_that_of_several_pallets_the_first_alone_is_seen() -> None:
     seen, unseen = replace(record(None), pallets_deep=3), LocationRecord("A-2", "A1", None, 3)
-    rows = csv.DictReader(io.StringIO(as_csv([seen, unseen]).decode()))
-    assert [(row["pallets_deep"], row["pallets_seen"]) for row in rows] == [("3", "1"), ("3", "0")]
-    places = json.loads(as_json([seen, unseen]))["locations"]
-    assert [(place["pallets_deep"], place["pallets_seen"]) for place in places] == [(3, 1), (3, 0)]
+    empty = LocationRecord("A-3", "A1", Observation("r", "A-3", 1, LocationState.EMPTY, 0.9), 3)
+    rows = csv.DictReader(io.StringIO(as_csv([seen, unseen, empty]).decode()))
+    assert [(row["pallets_deep"], row["pallets_seen"]) for row in rows] == [
+        ("3", "1"),
+        ("3", "0"),
+        ("3", "0"),
+    ]
+    places = json.loads(as_json([seen, unseen, empty]))["locations"]
+    assert [(place["pallets_deep"], place["pallets_seen"]) for place in places] == [(3, 1), (3, 0), (3, 0)]

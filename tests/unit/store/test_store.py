@@ -44,7 +44,9 @@ def test_how_deep_places_are_follows_the_newest_plan_and_is_merged(tmp_path: Pat
         store.plan([PlannedLocation("A-01", "A1", 2)])
         store.plan([PlannedLocation("A-01", "A1", 3), PlannedLocation("A-02", "A1")])
         store.commit(look(1))
+        other.plan([PlannedLocation("A-01", "A1")])
         other.merge(store)
+        store.merge(other)
         for one in (store, other):
             assert [(r.pallets_deep, r.pallets_seen) for r in one.locations()] == [(3, 1), (1, 0)]
 
