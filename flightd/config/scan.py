@@ -48,6 +48,13 @@ class ScanExpert(Section):
     )
 
 
+def _cores() -> int:
+    """Those on which this process may run: a service may be kept to a few."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 class ScanConfig(Section):
     """How the front camera counts the locations of a shelf.
 
@@ -95,7 +102,7 @@ class ScanConfig(Section):
     @field_validator("workers")
     @classmethod
     def _as_cores_allow(cls, workers: int) -> int:
-        return workers or min(max((os.cpu_count() or 1) - _OTHER_CORES, 1), _MOST_WORKERS)
+        return workers or min(max(_cores() - _OTHER_CORES, 1), _MOST_WORKERS)
 
     @model_validator(mode="after")
     def _heights_in_order(self) -> Self:

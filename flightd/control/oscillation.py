@@ -133,7 +133,7 @@ class OscillationMonitor:
         else:
             self.ease = min(max(self.ease * _EASED, LEAST_EASE), self.ease)
         if self._tried:  # it was not the first seconds of a flight that knew little
-            self._most = self.ease
+            self._most = max(self.ease, LEAST_EASE)
         self._axes = _Axis(), _Axis()
         self._found_ns = now_ns
         self.swings = True

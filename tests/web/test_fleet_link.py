@@ -142,7 +142,7 @@ def test_what_ends_as_the_broker_answers_ends(
     async def go(broker: Mosquitto) -> None:
         await broker.listens()
         async with managed_drone(broker, Version.V2_1):
-            await until(lambda: ended and ended[0].done(), 10)
+            await until(lambda: ended and ended[0].done(), 30)
 
     monkeypatch.setattr(aiomqtt.Client, "publish", published)
     with mosquitto(tmp_path) as broker:

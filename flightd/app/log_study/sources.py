@@ -84,7 +84,11 @@ def _fetch(files: Any, log: PurePosixPath, into: Path) -> None:
     for name in (log.name, *(name for name in _BESIDE if name in there)):
         files.get_file(str(log.parent / name), str(into / name))
     if _PICTURES in there:
-        files.get(f"{log.parent / _PICTURES}/", f"{into / _PICTURES}/", recursive=True)
+        for name in files.find(str(log.parent / _PICTURES)):  # one by one: a folder's name may have brackets
+            parts = PurePosixPath(name).parts
+            picture = into.joinpath(*parts[len(parts) - 1 - parts[::-1].index(_PICTURES) :])
+            picture.parent.mkdir(parents=True, exist_ok=True)
+            files.get_file(name, str(picture))
 
 
 def _is_flight(name: str) -> bool:

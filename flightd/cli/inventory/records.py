@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Final, TypeAlias
 
 import typer
 
-from flightd.core.inventory import LocationState
 from flightd.core.label_values import LEAST_CONFIDENCE, ValueKind
 from flightd.core.terminal_text import visible
 
@@ -33,6 +32,7 @@ def print_records(records: Sequence[LocationRecord], least_confidence: float = L
 
 def _known(record: LocationRecord, least_confidence: float) -> Iterator[str]:
     """Lot, expiry, how full the place is, and the cases in its front, as far as they are known."""
+    from flightd.core.inventory import LocationState
     from flightd.inventory.place_values import place_values
 
     seen = record.observation

@@ -382,6 +382,7 @@ class Dispatcher:
             may_work = bool(self.queue.open) and now_ms >= self._next_try_ms.get(drone, 0)
             if not (may_work and self._give_tour(drone, now_ms, most)):
                 self._held |= set(self.control.replan([drone], now_ms))
+                self._settle_tours()
 
     def _give_tours(self, now_ms: int) -> None:
         ready = [drone for drone in self.control.drones if self._may_begin(drone)]

@@ -68,11 +68,13 @@ class Distances:
 
     def _chain(self, vertex: int, before: int) -> _Chain:
         chain: list[tuple[int, int]] = []
+        seen = {vertex}  # a ring of one-way lanes whose entries are shut never branches
         along_ms, here, after = 0, before, vertex
         while True:
             along_ms += self._onto[after][here]
             chain.append((here, along_ms))
             onward = [each for each in self._onto[here] if each != after]
-            if len(onward) != 1 or here == vertex:
+            if len(onward) != 1 or here in seen:
                 return tuple(chain)
+            seen.add(here)
             here, after = onward[0], here

@@ -76,7 +76,8 @@ class PrioritisedPlanner:
         """The reservations that one drone has to go round, without those of other plans."""
         table = ReservationTable(self._conflicts)
         for holder, resource, from_ms, to_ms in fixed.taken:
-            table.take(holder, resource, from_ms, to_ms)
+            # by another name than its plan: who displaces that does not have what is released
+            table.take(f"released to {holder}", resource, from_ms, to_ms)
         for resource in fixed.closed_for.get(drone, fixed.closed):
             table.take("closed", resource, 0, NEVER, (resource,))
         return table

@@ -12,7 +12,12 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Final, TypeAlias
 
-from flightd.fleet.traffic.action_graph import ActionGraph, Course
+from flightd.fleet.traffic.action_graph import (
+    ActionGraph,
+    ConflictingPlansError,
+    Course,
+    CyclicDependenciesError,
+)
 from flightd.fleet.traffic.cells import CellSize, Conflicts, conflicts_of, within
 from flightd.fleet.traffic.closures import ClosedAir
 from flightd.fleet.traffic.drone_course import DroneCourse
@@ -364,11 +369,17 @@ class TrafficControl:
         return avoided | closed, inside
 
     def _adopt(self, projected: Mapping[str, Sequence[Action]], plans: Mapping[str, Plan]) -> None:
+        before = {drone: course.ahead for drone, course in self.drones.items()}
         for drone, course in self.drones.items():
             n = len(course.base)
             actions = list(projected[drone])
             course.ahead = [*actions[:n], *plans[drone].actions] if drone in plans else actions
-        self._rebuild()
+        try:
+            self._rebuild()
+        except (ConflictingPlansError, CyclicDependenciesError):
+            for drone, ahead in before.items():
+                self.drones[drone].ahead = ahead
+            raise
 
     def _rebuild(self) -> None:
         courses = {

@@ -57,7 +57,7 @@ class Steering:
             )
             age_s = min(inputs.telemetry_age_s, inputs.sight_s)
         else:
-            eased = replace(conditions, ease=max(conditions.ease * ease, LEAST_EASE))
+            eased = replace(conditions, ease=max(conditions.ease * ease, min(ease, LEAST_EASE)))
             wanted = control.step(now_ns, motion, reference, dt_s, eased)
             # above the pad the mission steers on without lines: by the mat, or the motion last known
             by_mat = inputs.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)

@@ -25,7 +25,8 @@ from flightd.sim.judge.motion import OFF_FLOOR_M, TrueMotion, Values
 _AT_NODE_M = 0.5
 """A node counts as visited rightly when the drone was within this of it (less than half a cell)."""
 _ASIDE_M = 0.4
-"""So much farther where no other node is as near: from there a shelf is looked at again (`scan.aside_m`)."""
+"""So much farther along the aisle where no other node is as near: from there a shelf is looked at again
+(`scan.aside_m`)."""
 _LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
 """An event of this phase is a warning where the landing is not the plan's."""
 _CONTROL_GAP_S = 0.5
@@ -148,7 +149,8 @@ def _at_node(flight: FlightEvidence, event: Event) -> bool:
         return False
     off_m = math.hypot(there.x_m - node.x_m, there.y_m - node.y_m)
     nearest_m = min(math.hypot(there.x_m - n.x_m, there.y_m - n.y_m) for n in flight.site.nodes.values())
-    return off_m < (_AT_NODE_M if off_m > nearest_m else _AT_NODE_M + _ASIDE_M)
+    aside_m = max(abs(there.x_m - node.x_m) - _ASIDE_M, 0.0) if off_m <= nearest_m else math.inf
+    return min(off_m, math.hypot(aside_m, there.y_m - node.y_m)) < _AT_NODE_M
 
 
 def _flight_time_s(motion: TrueMotion) -> float:

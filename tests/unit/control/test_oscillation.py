@@ -41,6 +41,29 @@ def test_one_that_grows_is_found_by_its_second_half_swing() -> None:
     assert (swung(OscillationMonitor(), swing(2.0, 0.7, 5.0, 0.4)) or math.inf) <= 2.0
 
 
+def test_how_wild_it_is_is_judged_by_the_axis_that_swings() -> None:
+    monitor = OscillationMonitor()
+    for tick in range(50):
+        monitor.step(tick * TICK_NS, 0.95 * math.sin(math.pi * tick / 50), 0.0)
+    for tick, off_mps in enumerate(swing(1.0, 0.0, 3.0), start=400):
+        if not monitor.swings:
+            monitor.step(tick * TICK_NS, 0.0, off_mps)
+    assert monitor.ease == 0.6
+
+
+def test_what_was_hardly_held_any_more_is_held_again_once_it_is_calm() -> None:
+    monitor = OscillationMonitor()
+    now_ns, eases = 0, []
+    for wild_s, calm_s in ((6.0, 30.0), (6.0, 30.0)):
+        ticks = round(wild_s * 1e9 / TICK_NS), round(calm_s * 1e9 / TICK_NS)
+        for off_mps in [*swing(1.0, 0.0, wild_s, 1.2), *[0.0] * ticks[1]]:
+            monitor.step(now_ns, off_mps, 0.0)
+            now_ns += TICK_NS
+            eases.append(monitor.ease)
+    assert min(eases) == 0.12
+    assert eases[-1] == 0.35
+
+
 def test_one_that_dies_away_is_none() -> None:
     assert swung(OscillationMonitor(), swing(1.0, -0.6, 6.0, 1.0)) is None
 

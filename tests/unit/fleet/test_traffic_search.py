@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from flightd.fleet.traffic import sipp
 from flightd.fleet.traffic.action_graph import ActionGraph, Course
 from flightd.fleet.traffic.distances import Distances
-from flightd.fleet.traffic.lanes import lanes_of
+from flightd.fleet.traffic.lanes import Lane, LaneGraph, Vertex, lanes_of
 from flightd.fleet.traffic.motions import NEVER, MotionNet, at_rest, vertex_of
 from flightd.fleet.traffic.reservations import ENDLESS, ReservationTable
 from flightd.fleet.traffic.sections import NONE, sections_of
@@ -31,13 +31,13 @@ CONFLICTS = ((0, 1), (0, 1, 2), (1, 2))
 UNTIL_MS = 40
 
 
-def every_distance(net: MotionNet, goal: int) -> list[int]:
+def every_distance(net: MotionNet, goal: int, shut: frozenset[int] = frozenset()) -> list[int]:
     """Bellman and Ford's, lane by lane."""
     best = [NEVER] * len(net.lanes.vertices)
     best[goal] = 0
     for _ in best:
         for vertex, arcs in enumerate(net.lanes.arcs):
-            for arc in arcs:
+            for arc in (arc for arc in arcs if arc.resource not in shut):
                 best[vertex] = min(best[vertex], best[arc.to] + net.lower_bound_ms(arc))
     return best
 
@@ -57,6 +57,18 @@ def test_distances_are_the_shortest_ones_also_where_lines_are_one_way() -> None:
     distances = Distances(net)
     for goal in range(len(net.lanes.vertices)):
         assert list(distances.to(goal)) == every_distance(net, goal)
+
+
+def test_a_ring_of_one_ways_whose_entry_is_shut_has_an_end() -> None:
+    """0 to 1 to 4 to 3 and round again, out from 1 to 2, and in from 5 to 4."""
+    at = ((0.0, 0.0), (2.0, 0.0), (4.0, 0.0), (0.0, 4.0), (2.0, 4.0), (4.0, 4.0))
+    vertices = [Vertex(str(i), str(i), x_m, y_m, 1.5) for i, (x_m, y_m) in enumerate(at)]
+    ways = ((0, 1, 0), (1, 4, 1), (4, 3, 2), (3, 0, 3), (1, 2, 0), (5, 4, 2))
+    net = MotionNet(LaneGraph(vertices, [Lane(a, b, 2.0, quarter, True) for a, b, quarter in ways]), PACE)
+    entry = frozenset(arc.resource for arc in net.lanes.arcs[5])
+    for shut in (frozenset[int](), entry):
+        for goal in range(6):
+            assert list(Distances(net, shut).to(goal)) == every_distance(net, goal, shut)
 
 
 def safe_by_force(taken: list[tuple[str, int, int, int]], resource: int) -> list[bool]:

@@ -217,5 +217,12 @@ def test_a_node_is_visited_rightly_from_aside_while_no_other_is_nearer(x_m: floa
     assert kinds(flown).get("miscounted", 0.0) == miscounted
 
 
+def test_across_the_aisle_it_is_no_farther_than_without() -> None:
+    visited = Event(4 * S, EventLevel.INFO, "visited", "A2")
+    statuses = [status(0, node="A1", goal="A2"), DONE]
+    flown = evidence(landed(at(S, 0.0), at(4 * S, 1.6, y_m=0.6), at(7 * S, 0.0)), statuses, [visited])
+    assert kinds(flown)["miscounted"] == 1.0
+
+
 def test_each_kind_of_fault_says_what_it_is() -> None:
     assert all(KINDS.values())
