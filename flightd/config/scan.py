@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Final, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -10,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from flightd.config.label_text import LabelTextConfig
 from flightd.config.section import Section, unit
 from flightd.config.sweep import ScanMode, SweepConfig
+from flightd.core.processors import usable_cores
 
 _MOST_WORKERS: Final = 16
 _OTHER_CORES: Final = 2
@@ -46,13 +46,6 @@ class ScanExpert(Section):
     revisits: int = Field(
         2, ge=0, le=10, description="most times that a node is flown to again, its findings withdrawn"
     )
-
-
-def _cores() -> int:
-    """Those on which this process may run: a service may be kept to a few."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class ScanConfig(Section):
@@ -102,7 +95,7 @@ class ScanConfig(Section):
     @field_validator("workers")
     @classmethod
     def _as_cores_allow(cls, workers: int) -> int:
-        return workers or min(max(_cores() - _OTHER_CORES, 1), _MOST_WORKERS)
+        return workers or min(max(usable_cores() - _OTHER_CORES, 1), _MOST_WORKERS)
 
     @model_validator(mode="after")
     def _heights_in_order(self) -> Self:

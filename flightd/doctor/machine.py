@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from flightd.config.recorder import RecorderConfig
+from flightd.core.processors import usable_cores
 from flightd.doctor.check import Check, error, ok, warning
 
 _TICK_RESOLUTION_S = 0.001
@@ -120,7 +121,7 @@ def _read_load() -> Load:
     temperatures = [int(text) / 1000 for path in zones if (text := _text(path)).lstrip("-").isdigit()]
     memory = dict(line.split(":", 1) for line in _text(Path("/proc/meminfo")).splitlines())
     return Load(
-        cores=len(os.sched_getaffinity(0)),
+        cores=usable_cores(),
         load=os.getloadavg()[0],
         hottest_c=max(temperatures, default=None),
         governor=_text(Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")),

@@ -85,8 +85,7 @@ def _fetch(files: Any, log: PurePosixPath, into: Path) -> None:
         files.get_file(str(log.parent / name), str(into / name))
     if _PICTURES in there:
         for name in files.find(str(log.parent / _PICTURES)):  # one by one: a folder's name may have brackets
-            parts = PurePosixPath(name).parts
-            picture = into.joinpath(*parts[len(parts) - 1 - parts[::-1].index(_PICTURES) :])
+            picture = into / PurePosixPath(name).relative_to(log.parent)
             picture.parent.mkdir(parents=True, exist_ok=True)
             files.get_file(name, str(picture))
 

@@ -147,10 +147,10 @@ def _at_node(flight: FlightEvidence, event: Event) -> bool:
     node, there = flight.site.nodes.get(event.text), flight.truth_at(event.stamp_ns)
     if node is None or there is None:
         return False
-    off_m = math.hypot(there.x_m - node.x_m, there.y_m - node.y_m)
-    nearest_m = min(math.hypot(there.x_m - n.x_m, there.y_m - n.y_m) for n in flight.site.nodes.values())
-    aside_m = max(abs(there.x_m - node.x_m) - _ASIDE_M, 0.0) if off_m <= nearest_m else math.inf
-    return min(off_m, math.hypot(aside_m, there.y_m - node.y_m)) < _AT_NODE_M
+    along_m = abs(there.x_m - node.x_m)
+    if flight.site.nearest(there.x_m, there.y_m) == node:
+        along_m = max(along_m - _ASIDE_M, 0.0)
+    return math.hypot(along_m, there.y_m - node.y_m) < _AT_NODE_M
 
 
 def _flight_time_s(motion: TrueMotion) -> float:

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from flightd.core.inventory import PlaceFill
 from flightd.core.scanning import Occupancy
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.stock import StockShares
-from flightd.sim.racks.stock_truth import stock_truth
+from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
 from flightd.site.site_file import load_site
 from flightd.vision.shelf.shelf_look import read_shelf
 from tests.sim.pictures.shelf_pictures import shelf_pictures
@@ -21,6 +22,17 @@ SITE = load_site(Path(__file__).parents[3] / "configs" / "site-racks-small.toml"
 CAMERA = FrontCamera()
 LOOK = replace(RackAppearance(), in_part=1.0)
 SEED = 31
+
+
+def fills(look: RackAppearance) -> list[tuple[LocationTruth, PlaceFill | None]]:
+    """What is true of each place in the pictures before two nodes, and what one picture tells of it."""
+    assigner = Assigner(SITE, FrontSight(CAMERA.lens, CAMERA.mount))
+    truth = stock_truth(SITE, look, CAMERA.lens.fx_px, SEED)
+    told: list[tuple[LocationTruth, PlaceFill | None]] = []
+    for seen in shelf_pictures(SITE, CAMERA, look, SEED, ("A2", "B3")):
+        codes, _ = read_shelf(seen.picture, 0, 0, assigner.places(seen.pose, seen.view.locations))
+        told += [(truth[place.location], place.fill) for place in codes.places]
+    return told
 
 
 @pytest.mark.parametrize(
@@ -43,13 +55,8 @@ def test_a_place_with_goods_at_its_sides_alone_is_not_taken_for_empty(
 
 
 def test_how_full_places_are_is_told_within_ten_points() -> None:
-    assigner = Assigner(SITE, FrontSight(CAMERA.lens, CAMERA.mount))
-    truth = stock_truth(SITE, LOOK, CAMERA.lens.fx_px, SEED)
-    told = []
-    for seen in shelf_pictures(SITE, CAMERA, LOOK, SEED, ("A2", "B3")):
-        codes, _ = read_shelf(seen.picture, 0, 0, assigner.places(seen.pose, seen.view.locations))
-        told += [(truth[place.location].fill, place.fill) for place in codes.places]
-    known = [(true, fill.share) for true, fill in told if fill is not None and fill.share is not None]
+    told = fills(LOOK)
+    known = [(true.fill, fill.share) for true, fill in told if fill is not None and fill.share is not None]
     assert len(known) >= 0.7 * len(told) >= 8
     assert sum(abs(share - true) <= 0.1 for true, share in known) >= 0.9 * len(known)
     assert max(true for true, _ in known) - min(true for true, _ in known) > 0.3
@@ -57,12 +64,7 @@ def test_how_full_places_are_is_told_within_ten_points() -> None:
 
 def test_cases_are_counted_in_regular_stacks_and_nowhere_else() -> None:
     look = replace(RackAppearance(), shares=StockShares(empty=0.05), cartons=0.8)
-    assigner = Assigner(SITE, FrontSight(CAMERA.lens, CAMERA.mount))
-    truth = stock_truth(SITE, look, CAMERA.lens.fx_px, SEED)
-    told = []
-    for seen in shelf_pictures(SITE, CAMERA, look, SEED, ("A2", "B3")):
-        codes, _ = read_shelf(seen.picture, 0, 0, assigner.places(seen.pose, seen.view.locations))
-        told += [(truth[place.location].boxes, place.fill) for place in codes.places]
+    told = [(true.boxes, fill) for true, fill in fills(look)]
     counted = [(boxes, fill.cases) for boxes, fill in told if fill is not None and fill.cases is not None]
     plain = [boxes for boxes, _ in told if len(boxes) > 1 and boxes[0] > 1 and len(set(boxes)) == 1]
     assert len(counted) >= 0.4 * len(plain) >= 1.2
