@@ -47,6 +47,9 @@ class SensorPriors(Section):
     scale_share: float = Field(
         0.03, gt=0, le=0.5, description="error of the focal length", json_schema_extra=unit("share")
     )
+    height_share: float = Field(
+        0.02, gt=0, le=0.5, description="lasting error of the told height", json_schema_extra=unit("share")
+    )
     heading_degps: float = Field(0.1, gt=0, le=5, description="drift of the vehicle's heading")
     shake_deg: float = Field(0.15, gt=0, le=5, description="picture against attitude, frame by frame")
     most_shake_deg: float = Field(1.5, gt=0, le=10, description="the most that is believed of it")

@@ -13,7 +13,8 @@ class Learnt(enum.IntEnum):
     ROLL, PITCH: the told attitude is too small by this, rad; LEAK: rate at which it leaks, 1/s; MOUNT_ROLL,
     MOUNT_PITCH, MOUNT_YAW: the camera in the airframe, rad; DELAY: frames are exposed so much later than
     their stamps say, s; SCALE: share by which the camera's focal length is shorter, so that lengths on a
-    floor that is looked down on are longer."""
+    floor that is looked down on are longer; HEIGHT_SCALE: share by which the told height is too small for
+    good, so that all distances from the place straight below are longer."""
 
     ROLL = 0
     PITCH = 1
@@ -23,6 +24,7 @@ class Learnt(enum.IntEnum):
     MOUNT_YAW = 5
     DELAY = 6
     SCALE = 7
+    HEIGHT_SCALE = 8
 
 
 @dataclass(frozen=True, slots=True)

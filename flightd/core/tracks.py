@@ -82,7 +82,8 @@ class SensorEstimate:
 
     Frames are exposed `delay_s` later than their stamps say: the camera's delay is that much shorter than
     configured, against the attitude's.  The camera sits rolled, pitched and turned by `mount` more than
-    configured, the told roll and pitch are too small by `tilt`, its focal length is shorter by `scale_share`.
+    configured, the told roll and pitch are too small by `tilt`, its focal length is shorter by `scale_share`,
+    the told height too small for good by `height_share`.
     `shake_rad` is what the picture shakes against the attitude from frame to frame (rms)."""
 
     delay_s: float = math.nan
@@ -98,6 +99,8 @@ class SensorEstimate:
     shake_rad: float = math.nan
     mount_yaw_rad: float = math.nan
     mount_yaw_sigma_rad: float = math.nan
+    height_share: float = math.nan
+    height_sigma: float = math.nan
 
     @property
     def is_known(self) -> bool:

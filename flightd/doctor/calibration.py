@@ -20,8 +20,8 @@ _LINE_MIN_PX = 4.0
 _CALIBRATE = "calibrate the camera: flightd calibrate"
 _NAME = "calibration"
 _STEPS = 50
-_LEARNT, _DELAY_S = "learnt", 0.02
-"""A delay that is off by more had better be configured."""
+_LEARNT, _DELAY_S, _HEIGHT_SHARE = "learnt", 0.02, 0.03
+"""A delay that is off by more had better be configured, a height that is looked into."""
 
 
 def check_calibration(camera: CameraConfig, site: Site, height_m: float) -> list[Check]:
@@ -75,13 +75,18 @@ def check_learnt(config: Config) -> list[Check]:
     delay_s, sigma_s = -learnt.mean(Learnt.DELAY), learnt.sigma(Learnt.DELAY)
     roll, pitch = (math.degrees(learnt.mean(one)) for one in (Learnt.MOUNT_ROLL, Learnt.MOUNT_PITCH))
     mount_sigma = math.degrees(learnt.sigma(Learnt.MOUNT_ROLL))
+    height, height_sigma = learnt.mean(Learnt.HEIGHT_SCALE), learnt.sigma(Learnt.HEIGHT_SCALE)
     text = (
         f"beyond the configuration: delay {delay_s * 1e3:+.0f} ms (sigma {sigma_s * 1e3:.0f}), mount roll"
-        f" {roll:+.1f} and pitch {pitch:+.1f} deg (sigma {mount_sigma:.1f})"
+        f" {roll:+.1f} and pitch {pitch:+.1f} deg (sigma {mount_sigma:.1f}),"
+        f" height {height:+.1%} (sigma {height_sigma:.1%})"
     )
-    if abs(delay_s) < max(_DELAY_S, 3.0 * sigma_s):
-        return [ok(_LEARNT, text)]
-    return [warning(_LEARNT, text, f"camera.latency_s = {max(config.camera.latency_s + delay_s, 0.0):.3f}")]
+    remedies = []
+    if abs(delay_s) >= max(_DELAY_S, 3.0 * sigma_s):
+        remedies.append(f"camera.latency_s = {max(config.camera.latency_s + delay_s, 0.0):.3f}")
+    if abs(height) >= max(_HEIGHT_SHARE, 2.0 * height_sigma):
+        remedies.append("measure what the range finder reads, and its offset in the autopilot")
+    return [warning(_LEARNT, text, "; ".join(remedies)) if remedies else ok(_LEARNT, text)]
 
 
 def _unfolds(lens: Lens) -> bool:

@@ -12,6 +12,7 @@ from flightd.tracking.motion_model import (
     DELAY,
     FIRST_LINE,
     HEIGHT,
+    HEIGHT_SCALE,
     LEAK,
     MOUNT_PITCH,
     MOUNT_ROLL,
@@ -43,6 +44,7 @@ def first_sigmas(noise: MotionNoise, priors: SensorPriors) -> Matrix:
     sigmas[LEAK] = priors.leak_per_s
     sigmas[[MOUNT_ROLL, MOUNT_PITCH]], sigmas[MOUNT_YAW] = priors.mount_rad, priors.mount_yaw_rad
     sigmas[DELAY], sigmas[SCALE] = priors.delay_s, priors.scale_share
+    sigmas[HEIGHT_SCALE] = priors.height_share
     return sigmas
 
 
@@ -55,4 +57,5 @@ def drift_of(priors: SensorPriors) -> Matrix:
     drift[[MOUNT_ROLL, MOUNT_PITCH]] = priors.mount_rad * 0.002
     drift[MOUNT_YAW] = priors.mount_yaw_rad * 0.002
     drift[DELAY], drift[SCALE] = priors.delay_s * 0.01, priors.scale_share * 0.01
+    drift[HEIGHT_SCALE] = priors.height_share * 0.005
     return drift

@@ -33,6 +33,7 @@ from flightd.tracking.motion_model import (
     FIRST_LINE,
     HEIGHT,
     HEIGHT_S,
+    HEIGHT_SCALE,
     LEAK,
     MOUNT_PITCH,
     MOUNT_ROLL,
@@ -57,7 +58,7 @@ _UNSEEN_S = 0.1
 """An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
 _SENSORS, _LASTING = slice(ROLL, FIRST_LINE), slice(LEAK, FIRST_LINE)
 """What is wrong with the sensors, and what of it is learnt for good."""
-_TILTS = [HEIGHT, *range(ROLL, DELAY), SCALE]
+_TILTS = [HEIGHT, *range(ROLL, DELAY), SCALE, HEIGHT_SCALE]
 """All of the sensors but the delay."""
 _BUT_MOTION = [PSI, PSI_RATE, *range(LEAK, FIRST_LINE)]
 """All but velocities, disturbances, the error of the attitude and the lines."""
@@ -151,11 +152,13 @@ class FloorFilter:
             tilt_sigma_rad=max(self.sigma(ROLL), self.sigma(PITCH)),
             scale_share=self.mean(SCALE),
             scale_sigma=self.sigma(SCALE),
+            height_share=self.mean(HEIGHT_SCALE),
+            height_sigma=self.sigma(HEIGHT_SCALE),
             shake_rad=self._innovations.shake_rad,
         )
 
     def learnt(self) -> LearntSensors:
-        """What is known of the sensors, from `ROLL` to `SCALE`."""
+        """What is known of the sensors, from `ROLL` to `HEIGHT_SCALE`."""
         covariance = self._p[_SENSORS, _SENSORS]
         return LearntSensors(tuple(self._x[_SENSORS].tolist()), tuple(covariance.ravel().tolist()))
 
@@ -418,6 +421,7 @@ class FloorFilter:
         self._bound_push()
         self._bound(LEAK, 0.0, _MOST_LEAK_PER_S)
         self._bound(SCALE, -_MOST_SCALE, _MOST_SCALE)
+        self._bound(HEIGHT_SCALE, -_MOST_SCALE, _MOST_SCALE)
         self._bound(DELAY, -delay_s, min(delay_s, self._latency_s))  # no frame arrives before it is exposed
         if minded:
             self._mind(errors / np.sqrt(np.diag(spread)), measured.axes)

@@ -10,6 +10,7 @@ from flightd.tracking.motion_model import (
     DELAY,
     FIRST_LINE,
     HEIGHT,
+    HEIGHT_SCALE,
     MOUNT_PITCH,
     MOUNT_ROLL,
     MOUNT_YAW,
@@ -69,7 +70,7 @@ def offset_error(sight: LineSight, line: int, x: Matrix, rates: Rates) -> tuple[
     row = placed(sight, x, rates)
     row[column] = -1.0
     # as held, not as seen: what is seen has the noise in it that is weighed here, and scale would shrink
-    row[SCALE], row[HEIGHT] = x[column] - sight.axis_m, x[column]
+    row[SCALE], row[HEIGHT], row[HEIGHT_SCALE] = x[column] - sight.axis_m, x[column], x[column]
     return row, sight.offset_m - float(x[column])
 
 
@@ -83,5 +84,5 @@ def placed(sight: LineSight, x: Matrix, rates: Rates) -> Matrix:
     row[PSI] = by_yaw
     turning = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + by_yaw * rates.yaw_radps
     row[DELAY] = turning + x[VELOCITY[sight.axis]]
-    row[SCALE], row[HEIGHT] = sight.offset_m - sight.axis_m, sight.offset_m
+    row[SCALE], row[HEIGHT], row[HEIGHT_SCALE] = sight.offset_m - sight.axis_m, sight.offset_m, sight.offset_m
     return row

@@ -38,6 +38,7 @@ from flightd.tracking.line_sight import (
 from flightd.tracking.motion_model import (
     DELAY,
     HEIGHT,
+    HEIGHT_SCALE,
     MOUNT_PITCH,
     MOUNT_ROLL,
     MOUNT_YAW,
@@ -136,8 +137,8 @@ class LineTracker:
 
     @property
     def scale_share(self) -> float:
-        """By which share the focal length is shorter than configured, or the height told too small."""
-        return self._filter.mean(SCALE)
+        """By which share the focal length is shorter than configured, and the height told too small."""
+        return self._filter.mean(SCALE) + self._filter.mean(HEIGHT_SCALE)
 
     @property
     def by_width_m(self) -> float | None:
@@ -198,7 +199,8 @@ class LineTracker:
             return False
         view = self._view(attitude, stamp_ns, height_m, self._lens)
         by_width_m = heights_by_width(lines.lines, view, self._line_width_m)
-        height_m = self._widths.believed_m(by_width_m, height_m) * (1.0 + self._filter.mean(HEIGHT))
+        off_share = self._filter.mean(HEIGHT) + self._filter.mean(HEIGHT_SCALE)
+        height_m = self._widths.believed_m(by_width_m, height_m) * (1.0 + off_share)
         if not height_m > 0:
             self.rejected += 1
             return False

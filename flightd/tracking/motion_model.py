@@ -5,7 +5,8 @@ The state is
 
     heading offset and its drift | velocity, disturbance of both grid axes | error of the told height
     | error of the told attitude | rate of its leak | mount of the camera | delay of its frames
-    | share by which its focal length is shorter | offsets of all lines and features of the floor held
+    | share by which its focal length is shorter | share by which the height is told too small for good
+    | offsets of all lines and features of the floor held
 
 Lines and features stand still, so all of them move with the one velocity; the control input is the
 acceleration that the attitude makes, g tan(tilt).  An autopilot without a position takes what its
@@ -25,8 +26,8 @@ from flightd.core.geometry import GRAVITY_MPS2, Matrix
 from flightd.core.types import Attitude
 
 PSI, PSI_RATE, VX, VY, PUSH_X, PUSH_Y, HEIGHT = range(7)
-ROLL, PITCH, LEAK, MOUNT_ROLL, MOUNT_PITCH, MOUNT_YAW, DELAY, SCALE = range(7, 15)
-FIRST_LINE = 15
+ROLL, PITCH, LEAK, MOUNT_ROLL, MOUNT_PITCH, MOUNT_YAW, DELAY, SCALE, HEIGHT_SCALE = range(7, 16)
+FIRST_LINE = 16
 HEIGHT_S = 0.5
 """Time within which an error of the told height, that of one averaged over a few samples, fades."""
 VELOCITY, PUSH = (VX, VY), (PUSH_X, PUSH_Y)

@@ -15,6 +15,7 @@ from flightd.adapters.ground_link.link import ZmqGround
 from flightd.config.ground import GroundConfig
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickInput, TickOutput
+from flightd.core.tracks import SensorEstimate, TrackSet
 from flightd.core.types import (
     Attitude,
     CommandKind,
@@ -128,7 +129,10 @@ def tell_once(
         now_ns - 500_000_000,
     )
     pose = GridPose(now_ns, "A2", x_m - 1.5, 0.01, 0.0, x_m, 0.01, 0.4, 0.3, 1.6, (0.0,) * 9, 0.99)
-    output = TickOutput(None, Demand.FLY, phase, "arrived", "A2", 1, 12, pose, None)
+    known = 0.01, 0.002, 0.02, -0.01, 0.005, 0.001, 0.0, 0.01, -0.02, 0.01, 0.003, 0.02, 0.004, 0.051, 0.012
+    seen = SensorEstimate(*known)
+    tracks = TrackSet(now_ns, now_ns, 0.0, 0.01, 0.4, 0.0, 0.0, 0.0, (), (), sensors=seen)
+    output = TickOutput(None, Demand.FLY, phase, "arrived", "A2", 1, 12, pose, tracks)
     latency_ms = {"detection": 5.0, "total": 71.0}
     told = Snapshot(TickInput(now_ns, vehicle=vehicle), output, 1, 12, 300, 2, 29.0, latency_ms)
     possible = possible_in(phase) - (frozenset() if armed else {CommandKind.PAUSE})  # no start is under way

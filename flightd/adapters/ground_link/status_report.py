@@ -69,6 +69,9 @@ def _sensors(known: SensorEstimate) -> SensorReport:
     def degrees(angle_rad: float) -> float:
         return round(math.degrees(angle_rad), 3)
 
+    def percent(share: float) -> float | None:
+        return None if math.isnan(share) else round(100.0 * share, 2)
+
     return SensorReport(
         delay_ms=round(-known.delay_s * 1e3, 2),
         delay_sigma_ms=round(known.delay_sigma_s * 1e3, 2),
@@ -81,6 +84,10 @@ def _sensors(known: SensorEstimate) -> SensorReport:
         mount_yaw_deg=degrees(known.mount_yaw_rad),
         mount_yaw_sigma_deg=degrees(known.mount_yaw_sigma_rad),
         shake_deg=degrees(known.shake_rad),
+        focal_percent=percent(1.0 / (1.0 + known.scale_share) - 1.0),
+        focal_sigma_percent=percent(known.scale_sigma),
+        height_percent=percent(known.height_share),
+        height_sigma_percent=percent(known.height_sigma),
     )
 
 

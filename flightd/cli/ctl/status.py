@@ -12,7 +12,7 @@ from flightd.cli.options import AsJson
 from flightd.core.errors import UnavailableError
 
 if TYPE_CHECKING:
-    from flightd.adapters.ground_link.messages.published import StatusReport
+    from flightd.adapters.ground_link.messages.published import SensorReport, StatusReport
 
 
 def register(app: typer.Typer) -> None:
@@ -67,10 +67,20 @@ def status_lines(report: StatusReport) -> list[str]:
             f" mount roll {seen.mount_roll_deg:+.1f} pitch {seen.mount_pitch_deg:+.1f} deg"
             f" (sigma {seen.mount_sigma_deg:.1f}) yaw {seen.mount_yaw_deg:+.1f}"
             f" (sigma {seen.mount_yaw_sigma_deg:.1f}), attitude {seen.tilt_roll_deg:+.1f}"
-            f" {seen.tilt_pitch_deg:+.1f} deg (sigma {seen.tilt_sigma_deg:.1f})"
+            f" {seen.tilt_pitch_deg:+.1f} deg (sigma {seen.tilt_sigma_deg:.1f})" + _scales(seen)
         )
     lines.append(
         f"link     {link.attending} attending, {link.refused} of {link.requests} requests refused, "
         f"{link.denied} connections denied"
     )
     return lines
+
+
+def _scales(seen: SensorReport) -> str:
+    """Focal length and height, where the daemon tells them."""
+    scales = (seen.focal_percent, seen.focal_sigma_percent), (seen.height_percent, seen.height_sigma_percent)
+    return "".join(
+        f", {name} {off:+.1f} % (sigma {sigma:.1f})"
+        for name, (off, sigma) in zip(("focal length", "height"), scales, strict=True)
+        if off is not None and sigma is not None
+    )

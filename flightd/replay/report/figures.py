@@ -65,6 +65,7 @@ def key_figures(flight: RecordedFlight) -> tuple[Figure, ...]:
         _flight_time(flight),
         _latency(flight),
         _delay(flight),
+        _scales(flight),
         _frames(flight),
         _battery(flight),
     )
@@ -217,6 +218,17 @@ def _delay(flight: RecordedFlight) -> Figure | None:
     sigma = number(seen.delay_sigma_s * 1e3, 1)
     note = f"± {sigma}, more than configured; mounted {off}° off in roll, pitch and yaw"
     return Figure("Camera delay", f"{-seen.delay_s * 1e3:+.0f}", "ms", note)
+
+
+def _scales(flight: RecordedFlight) -> Figure | None:
+    """The height as the lines have it, against the one told; None of an older log."""
+    seen = flight.sensors
+    if math.isnan(seen.height_share):
+        return None
+    focal = number(100.0 * (1.0 / (1.0 + seen.scale_share) - 1.0), 1)
+    sigma = number(100.0 * seen.height_sigma, 1)
+    note = f"± {sigma}, more than told; focal length {focal} % more than configured"
+    return Figure("Height", f"{100.0 * seen.height_share:+.1f}", "%", note)
 
 
 def _frames(flight: RecordedFlight) -> Figure | None:

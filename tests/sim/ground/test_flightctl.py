@@ -54,6 +54,8 @@ async def test_status_and_commands() -> None:
         assert code == 0
         assert out.startswith("follow: arrived")
         assert "GUIDED_NOGPS, armed, battery 80%" in out
+        assert "delay -10 ms (sigma 2)" in out
+        assert "focal length +2.0 % (sigma 1.0), height +5.1 % (sigma 1.2)" in out
         code, out, _ = await flightctl(*at(link), "status", "--json")
         assert (code, json.loads(out)["node"]) == (0, "A2")
         code, out, _ = await flightctl(*at(link), "goto", "A5")

@@ -17,9 +17,10 @@ from flightd.doctor.check import CheckLevel
 from tests.rigs.event_loops import real
 
 CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
-SIGMAS = (0.01, 0.01, 0.02, 0.004, 0.004, 0.006, 0.003, 0.002)
+SIGMAS = (0.01, 0.01, 0.02, 0.004, 0.004, 0.006, 0.003, 0.002, 0.01)
 LEARNT = LearntSensors(
-    (0.001, -0.002, 0.1, 0.017, -0.008, 0.01, -0.031, 0.0), tuple(np.diag(np.square(SIGMAS)).ravel().tolist())
+    (0.001, -0.002, 0.1, 0.017, -0.008, 0.01, -0.031, 0.0, 0.01),
+    tuple(np.diag(np.square(SIGMAS)).ravel().tolist()),
 )
 
 
@@ -95,5 +96,11 @@ def test_the_doctor_tells_it_and_what_to_configure(tmp_path: Path) -> None:
     means[Learnt.DELAY] = 0.004
     kept(path, config, LearntSensors(tuple(means), LEARNT.covariance))
     assert check_learnt(config)[0].level is CheckLevel.OK
+    means[Learnt.HEIGHT_SCALE] = 0.052
+    kept(path, config, LearntSensors(tuple(means), LEARNT.covariance))
+    (check,) = check_learnt(config)
+    assert check.level is CheckLevel.WARNING
+    assert "height +5.2%" in check.text
+    assert "range finder" in check.remedy
     path.write_text("{")
     assert check_learnt(config)[0].level is CheckLevel.ERROR

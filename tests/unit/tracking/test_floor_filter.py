@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 
 from flightd.config.tracking import MotionNoise, SensorPriors
+from flightd.core.learnt import Learnt
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.line_sight import FeatureSight, LineSight, Rates, feature_sight
 from flightd.tracking.motion_model import DELAY, FIRST_LINE, MOUNT_ROLL, PSI, PUSH_X, VX
@@ -21,6 +22,7 @@ SURE = SensorPriors(
     mount_deg=1e-4,
     delay_s=1e-6,
     scale_share=1e-6,
+    height_share=1e-6,
     shake_deg=0.03,
     most_shake_deg=0.031,
 )
@@ -161,7 +163,7 @@ def test_what_was_learnt_is_begun_with_but_less_surely() -> None:
     assert second.mean(MOUNT_ROLL) == first.mean(MOUNT_ROLL) != 0.0
     assert first.sigma(MOUNT_ROLL) < second.sigma(MOUNT_ROLL) < SensorPriors().mount_rad
     third = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
-    third.begin_with(replace(first.learnt(), means=(math.nan,) * 8))
+    third.begin_with(replace(first.learnt(), means=(math.nan,) * len(Learnt)))
     assert third.mean(MOUNT_ROLL) == 0.0, "what is no number is not begun with"
 
 

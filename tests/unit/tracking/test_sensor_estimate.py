@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import pytest
 
+from flightd.config.tracking import TrackingConfig
 from flightd.core.geometry import GRAVITY_MPS2, Lens, Mount
 from flightd.core.tracks import SensorEstimate
 from flightd.core.types import Attitude
@@ -16,9 +17,11 @@ from flightd.sim.random_sites import random_site
 from flightd.tracking.line_tracker import LineTracker
 from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
 
+DEFAULTS = TrackingConfig()
 LENS = Lens(640, 360, 381.4, 381.4, 319.5, 179.5)
 HEIGHT_M = 1.6
 SITE = random_site(3)
+XS_M = sorted({node.x_m for node in SITE.nodes.values()})
 TICK_S, FRAME_S, ARRIVES_S = 0.02, 1 / 30, 0.1
 DRAG_PER_S = 0.25
 WAVES_X = ((0.15, 2.6, 0.0), (0.15, 1.1, 0.5), (0.05, 4.1, 2.0))
@@ -37,6 +40,8 @@ class Truth:
     leak_per_s: float = 0.0
     focal_share: float = 1.0
     """The focal length as a share of the configured one."""
+    height_share: float = 0.0
+    """The told height is too small by this share of it."""
 
 
 def swung(waves: tuple[tuple[float, float, float], ...], t: float) -> tuple[float, float, float]:
@@ -57,10 +62,14 @@ def swinging(t: float) -> Kinematics:
 
 
 def told(
-    truth: Truth, seed: int, seconds: float = 20.0, look: Callable[[LineTracker, float], None] | None = None
+    truth: Truth,
+    seed: int,
+    seconds: float = 20.0,
+    look: Callable[[LineTracker, float], None] | None = None,
+    config: TrackingConfig = DEFAULTS,
 ) -> SensorEstimate:
     """What the tracker says after so long; `look` sees it, and the time, after each frame."""
-    tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0)
+    tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0, config=config)
     turned = map(math.radians, (truth.mount_roll_deg, truth.mount_pitch_deg))
     lens = LENS.longer_by(truth.focal_share)
     eye = IdealEye(SITE, lens, Mount(0.0, (0.0, 0.0, 0.0), *turned), EyeErrors(), seed)
@@ -78,7 +87,7 @@ def told(
             frame_s += FRAME_S
             waiting.append((t + ARRIVES_S, eye.see(k, n, round((t - truth.delay_s) * 1e9))))
         while waiting and waiting[0][0] <= t:
-            tracker.frame(waiting.pop(0)[1], HEIGHT_M)
+            tracker.frame(waiting.pop(0)[1], HEIGHT_M / (1.0 + truth.height_share))
             if look is not None:
                 look(tracker, t)
     tracks = tracker.at(round(seconds * 1e9))
@@ -114,23 +123,49 @@ def test_a_wrong_attitude_is_found_with_the_mount() -> None:
     assert roll == pytest.approx(1.5, abs=0.2)
 
 
+def told_with_speed(
+    truth: Truth, map_sigma_m: float = math.inf, config: TrackingConfig = DEFAULTS
+) -> tuple[SensorEstimate, float]:
+    """What the tracker says after 20 s, and the error of its speed from half time on, m/s rms; where its
+    sigma is finite, a map tells how far apart the lines are."""
+    squares: list[float] = []
+
+    def look(tracker: LineTracker, t: float) -> None:
+        tracks = tracker.at(round(t * 1e9))
+        if tracks is not None and map_sigma_m < math.inf:
+            at_m = SITE.nodes["A2"].x_m + swung(WAVES_X, t)[0]
+            places_m = {
+                line.id: min(XS_M, key=lambda x_m: abs(x_m - at_m - line.offset_m))
+                for line in tracks.across_x
+            }
+            tracker.survey(0, places_m, map_sigma_m)
+        if tracks is not None and t > 10.0:
+            off_x, off_y = tracks.vx_mps - swung(WAVES_X, t)[1], tracks.vy_mps - swung(WAVES_Y, t)[1]
+            squares.append(off_x**2 + off_y**2)
+
+    sensors = told(truth, 1, look=look, config=config)
+    return sensors, math.sqrt(sum(squares) / len(squares))
+
+
 @pytest.mark.parametrize("focal_share", [0.96, 1.04])
 def test_a_wrong_focal_length_is_found_and_makes_no_speed_of_a_lean(focal_share: float) -> None:
     """It moves what is seen away from where the camera looks, which swings with the drone, not from where the
     drone is: what scales lengths alone would leave a share of each lean as a way that was not flown."""
-
-    def speed_error_mps(share: float) -> tuple[SensorEstimate, float]:
-        squares: list[float] = []
-
-        def look(tracker: LineTracker, t: float) -> None:
-            tracks = tracker.at(round(t * 1e9))
-            if tracks is not None and t > 10.0:
-                off_x, off_y = tracks.vx_mps - swung(WAVES_X, t)[1], tracks.vy_mps - swung(WAVES_Y, t)[1]
-                squares.append(off_x**2 + off_y**2)
-
-        sensors = told(Truth(focal_share=share), 1, look=look)
-        return sensors, math.sqrt(sum(squares) / len(squares))
-
-    sensors, off_mps = speed_error_mps(focal_share)
+    sensors, off_mps = told_with_speed(Truth(focal_share=focal_share))
     assert abs(1.0 + sensors.scale_share - 1.0 / focal_share) < 2.0 * sensors.scale_sigma < 0.03
-    assert off_mps < 3.5 * speed_error_mps(1.0)[1]
+    assert off_mps < 3.5 * told_with_speed(Truth())[1]
+
+
+@pytest.mark.parametrize("height_share", [-0.06, 0.1])
+def test_a_height_told_wrong_for_good_is_found_and_makes_no_speed_of_a_lean(height_share: float) -> None:
+    """A range finder that is bent, or mounted lower than thought: the way that a lean moves the picture by is
+    taken as too long, and each lean as a way that was flown."""
+    truth = Truth(height_share=height_share)
+    sure = DEFAULTS.with_values(
+        expert=DEFAULTS.expert.with_values(priors=DEFAULTS.expert.priors.with_values(height_share=1e-6))
+    )
+    sensors, off_mps = told_with_speed(truth, 0.01)
+    assert 0.4 < sensors.height_share / height_share < 1.1
+    lengths = (1.0 + sensors.height_share) * (1.0 + sensors.scale_share)
+    assert lengths == pytest.approx(1.0 + height_share, abs=0.015)
+    assert off_mps < 0.7 * told_with_speed(truth, 0.01, sure)[1]

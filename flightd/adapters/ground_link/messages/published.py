@@ -76,6 +76,10 @@ class SensorReport(msgspec.Struct, frozen=True):
     mount_yaw_deg: Annotated[float, Meta(description="the camera turned in its mount, clockwise from above")]
     mount_yaw_sigma_deg: Annotated[float, Meta(description="standard deviation of that turn")]
     shake_deg: Annotated[float, Meta(description="the picture against the attitude, frame by frame, rms")]
+    focal_percent: Annotated[float | None, Meta(description="focal length, more than configured, %")] = None
+    focal_sigma_percent: Annotated[float | None, Meta(description="standard deviation of that, %")] = None
+    height_percent: Annotated[float | None, Meta(description="height, more than the vehicle tells, %")] = None
+    height_sigma_percent: Annotated[float | None, Meta(description="standard deviation of that, %")] = None
 
 
 class HazardReport(msgspec.Struct, frozen=True):
