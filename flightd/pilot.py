@@ -224,7 +224,7 @@ class Pilot:
         """Give each picture's codes to the scan, with the pose at its exposure, and the location labels
         among them to the localiser."""
         if tick.counted:
-            self._scanner.skip(tick.counted)
+            self._scanner.go_on_with(tick.counted)
         for codes in tick.codes:
             pose = self._estimator.poses.at(codes.stamp_ns)
             if pose is not None:

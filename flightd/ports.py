@@ -9,6 +9,7 @@ from flightd.core.exposure import ExposureState
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation
 from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
+from flightd.core.scanning import CountedPlace
 from flightd.core.shared_pose import SharedPose
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import (
@@ -223,8 +224,8 @@ class Store(Protocol):
         """Withdraw all that is pending of a run: the flights that saw it are over."""
         ...
 
-    def counted(self, run: str) -> frozenset[str]:
-        """The locations with a confirmed look of a run."""
+    def counted(self, run: str) -> tuple[CountedPlace, ...]:
+        """The locations with a confirmed look of a run, with what the newest of these read."""
         ...
 
     def locations(self) -> list[LocationRecord]:

@@ -9,7 +9,7 @@ from flightd.app.flight import Tasks
 from flightd.core.planned_flight import Planner
 from flightd.core.preview import CameraName, Preview
 from flightd.core.refusal import Refusal
-from flightd.core.scanning import CodeSet
+from flightd.core.scanning import CodeSet, CountedPlace
 from flightd.core.shared_pose import SharedPose
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickOutput
@@ -120,7 +120,7 @@ class NoCounting:
     def take(self) -> tuple[CodeSet, ...]:
         return ()
 
-    def take_counted(self) -> tuple[str, ...]:
+    def take_counted(self) -> tuple[CountedPlace, ...]:
         return ()
 
     def keep(self, output: TickOutput) -> None:

@@ -12,7 +12,7 @@ from flightd.app.publishers import TelemetryPublishers
 from flightd.core.errors import FlightdError
 from flightd.core.learnt import LearntSensors
 from flightd.core.refusal import Refusal
-from flightd.core.scanning import CodeSet
+from flightd.core.scanning import CodeSet, CountedPlace
 from flightd.core.shared_pose import SharedPose
 from flightd.core.tick import TickOutput
 from flightd.core.types import AttitudeSetpoint, LineSet
@@ -106,7 +106,7 @@ class Count(Protocol):
         """What was read since the last tick."""
         ...
 
-    def take_counted(self) -> tuple[str, ...]:
+    def take_counted(self) -> tuple[CountedPlace, ...]:
         """The locations that an earlier flight of this count has booked, told once."""
         ...
 

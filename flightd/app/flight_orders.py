@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,6 @@ from flightd.config.schema import Config
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.flight_order import FlightOrder
 from flightd.core.geometry import wrap_pi
-from flightd.mission.scan.scanner import nodes_to_count
 from flightd.site.site import Site
 
 
@@ -60,10 +59,9 @@ def going_on(
     neither where the flight may be `in_air` already (the daemon was started anew)."""
     if not run or folder is None or not (folder / "inventory.db").exists():
         return order
-    counted: Collection[str]
     try:
         with SqliteStore(folder, create=False) as store:
-            counted = store.counted(run)
+            counted = {place.location for place in store.counted(run)}
     except (InputError, UnavailableError):
         if not in_air:
             raise
@@ -76,3 +74,10 @@ def going_on(
     if in_air:
         return order
     raise InputError(f"inventory.run {run!r}: every location is counted; give the next count another name")
+
+
+def nodes_to_count(site: Site, nodes: Iterable[str], counted: Collection[str]) -> tuple[str, ...]:
+    """Those of some nodes that a flight which goes on with a count must still visit, in their order: the
+    ones with a location that is not `counted`."""
+    left = {location.node for location in site.locations.values() if location.code not in counted}
+    return tuple(node for node in nodes if node in left)

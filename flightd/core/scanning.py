@@ -161,6 +161,14 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
+class CountedPlace:
+    """A location that an earlier flight of the same count has booked, and the codes that it read there."""
+
+    location: str
+    reads: tuple[CodeRead, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Settled:
     """Locations whose pending findings are proven to be theirs, or withdrawn because they may not be.
 

@@ -6,7 +6,7 @@ import traceback
 from dataclasses import dataclass, field
 
 from flightd.core.refusal import Refusal
-from flightd.core.scanning import CodeSet, Finding, Settled
+from flightd.core.scanning import CodeSet, CountedPlace, Finding, Settled
 from flightd.core.shared_pose import SharedPose
 from flightd.core.tracks import TrackSet
 from flightd.core.types import (
@@ -34,8 +34,8 @@ _SHOWN_CHARS = 160
 class TickInput:
     """What arrived since the last tick, oldest first.  `vehicle` is the newest state, None until there
     is one; `ground_silent_s` the time since an attending ground station was heard, 0 if none attends;
-    `counted` names locations that an earlier flight of the same count has booked.  `unfit` is what the check
-    of this computer before the flight found against it; `aisle_closed` what the interlock of
+    `counted` are the locations that an earlier flight of the same count has booked.  `unfit` is what the
+    check of this computer before the flight found against it; `aisle_closed` what the interlock of
     the aisle says, where one is demanded."""
 
     now_ns: int
@@ -45,7 +45,7 @@ class TickInput:
     commands: tuple[Command, ...] = ()
     ground_silent_s: float = 0.0
     codes: tuple[CodeSet, ...] = ()
-    counted: tuple[str, ...] = ()
+    counted: tuple[CountedPlace, ...] = ()
     health: Health = HEALTHY
     unfit: Refusal | None = None
     aisle_closed: bool = True

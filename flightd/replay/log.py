@@ -188,7 +188,7 @@ def _decoder(kind: type) -> Decoder:
 
 def converted(value: object, kind: type[MessageT]) -> MessageT:
     """JSON values as the message that they were recorded of; msgspec.ValidationError if they are none."""
-    told = _without_empty_reasons(with_nan(value, kind))
+    told = _with_counted_places(_without_empty_reasons(with_nan(value, kind)))
     return msgspec.convert(told, kind, dec_hook=_recorded_reason)
 
 
@@ -207,6 +207,14 @@ def _without_empty_reasons(value: object) -> object:
         return value
     told = {key: item for key, item in value.items() if item != "" or key not in _REASONS}
     return told | {"vehicle": _without_empty_reasons(told["vehicle"])} if "vehicle" in told else told
+
+
+def _with_counted_places(value: object) -> object:
+    """Earlier versions told of a place that was counted before its name alone."""
+    if not isinstance(value, dict) or not value.get("counted"):
+        return value
+    places = [{"location": place} if isinstance(place, str) else place for place in value["counted"]]
+    return value | {"counted": places}
 
 
 def _recorded_reason(kind: type, value: object) -> object:

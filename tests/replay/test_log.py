@@ -3,6 +3,7 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
+import msgspec
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -11,9 +12,11 @@ from flightd.adapters.recorder.mcap_file import McapFile
 from flightd.adapters.recorder.mcap_repair import repair
 from flightd.adapters.recorder.schemas import encode
 from flightd.core.errors import InputError
+from flightd.core.scanning import CountedPlace
+from flightd.core.tick import TickInput
 from flightd.core.topics import Document, Topic
-from flightd.core.types import AttitudeSetpoint, Event, EventLevel
-from flightd.replay.log import read_log
+from flightd.core.types import AttitudeSetpoint, CodeRead, Event, EventLevel
+from flightd.replay.log import read_log, recorded_tick
 
 
 @pytest.fixture(scope="module")
@@ -93,3 +96,19 @@ def test_a_message_that_does_not_fit_its_topic_is_told(tmp_path: Path) -> None:
 def test_a_missing_log_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot open the flight log: No such file"):
         read_log(tmp_path / "none.mcap")
+
+
+@pytest.mark.parametrize(
+    ("told", "place"),
+    [
+        ('["A-1"]', CountedPlace("A-1")),
+        (
+            encode([CountedPlace("A-1", (CodeRead("QR Code", "T", (), True, 2, 1.0),))]).decode(),
+            CountedPlace("A-1", (CodeRead("QR Code", "T", (), True, 2, 1.0),)),
+        ),
+    ],
+    ids=["its name alone, as earlier versions did", "what was read there"],
+)
+def test_what_was_counted_before_the_flight_is_read_back(told: str, place: CountedPlace) -> None:
+    message = msgspec.json.decode(f'{{"now_ns": 7, "counted": {told}}}')
+    assert recorded_tick(Path("flight.mcap"), message) == TickInput(7, counted=(place,))

@@ -39,6 +39,7 @@ from flightd.core.inventory import (
     Standing,
 )
 from flightd.core.label_values import LabelValue
+from flightd.core.scanning import CountedPlace
 from flightd.core.types import CodeRead
 
 _VERSION = 7
@@ -267,14 +268,23 @@ class SqliteStore:
                 (Standing.WITHDRAWN, run, Standing.PENDING),
             )
 
-    def counted(self, run: str) -> frozenset[str]:
-        """The locations with a confirmed look of a run, whatever it told."""
+    def counted(self, run: str) -> tuple[CountedPlace, ...]:
+        """The locations with a confirmed look of a run, whatever it told, with what the newest of these read,
+        by their codes."""
+        newest: dict[str, tuple[str, list[CodeRead]]] = {}
         with self._reading():
-            rows = self._db.execute(
-                "SELECT DISTINCT location FROM observation WHERE run = ? AND standing = ?",
+            for location, look, symbology, text, sure, agreeing, quality, gs1 in self._db.execute(
+                "SELECT location, id, symbology, text, sure, agreeing, quality, gs1 FROM observation"
+                " LEFT JOIN code_read ON observation = id WHERE run = ? AND standing = ?"
+                " ORDER BY location, utc_ns, id, number",
                 (run, Standing.CONFIRMED),
-            ).fetchall()
-        return frozenset(row[0] for row in rows)
+            ):
+                if newest.get(location, ("",))[0] != look:
+                    newest[location] = look, []
+                if text is not None:
+                    read = CodeRead(symbology, text, (), bool(sure), agreeing, quality, _elements(gs1))
+                    newest[location][1].append(read)
+        return tuple(CountedPlace(location, tuple(reads)) for location, (_, reads) in newest.items())
 
     def keep_texts(self, observation: str, texts: Iterable[LabelValue], asked: str) -> None:
         """What was found printed in the picture of a look (by its id), searched for as `asked` says; in place

@@ -9,7 +9,7 @@ from flightd.app.counting.code_readers import Readers, ShelfWatch
 from flightd.app.counting.store_writer import StoreWriter
 from flightd.app.counting.text_searcher import TextSearcher
 from flightd.app.flight import Tasks
-from flightd.core.scanning import CodeSet, Finding, Place
+from flightd.core.scanning import CodeSet, CountedPlace, Finding, Place
 from flightd.core.tick import TickOutput
 from flightd.ports import Ground
 from flightd.runtime.frame_ring import FrameTicket
@@ -27,7 +27,7 @@ class Counting:
         readers: Readers,
         workers: int,
         writer: StoreWriter | None = None,
-        counted: frozenset[str] = frozenset(),
+        counted: tuple[CountedPlace, ...] = (),
         texts: TextSearcher | None = None,
     ) -> None:
         self._readers = readers
@@ -35,7 +35,7 @@ class Counting:
         self._workers = workers
         self._writer = writer
         self._texts = texts
-        self._counted: tuple[str, ...] = tuple(sorted(counted))
+        self._counted = counted
         self._findings: dict[str, Finding] = {}
         self._confirmed: set[str] = set()
 
@@ -69,7 +69,7 @@ class Counting:
         """What was read since the last tick."""
         return self._watch.take()
 
-    def take_counted(self) -> tuple[str, ...]:
+    def take_counted(self) -> tuple[CountedPlace, ...]:
         """The locations counted before, told once."""
         counted, self._counted = self._counted, ()
         return counted

@@ -16,6 +16,7 @@ from flightd.app.counting.text_searcher import TextSearcher
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import PlannedLocation
+from flightd.core.scanning import CountedPlace
 from flightd.mission.plan.flight_plan import counts_shelves
 from flightd.ports import Clock
 from flightd.runtime.clock import Hold
@@ -42,7 +43,7 @@ class FlightCount:
         self._stack = stack
         self._store: SqliteStore | None = None
         self._run = run
-        self._counted: frozenset[str] = frozenset()
+        self._counted: tuple[CountedPlace, ...] = ()
         self.error: FlightdError | None = None
         self.scans = counts_shelves(config, site)
         if not self.scans or folder is None:
@@ -54,7 +55,7 @@ class FlightCount:
                 raise
             self.error = err
 
-    def _opened(self, folder: Path, site: Site) -> tuple[SqliteStore, frozenset[str]]:
+    def _opened(self, folder: Path, site: Site) -> tuple[SqliteStore, tuple[CountedPlace, ...]]:
         """The store, ready for this flight, and what is counted already."""
         with ExitStack() as opened:
             store = opened.enter_context(SqliteStore(folder))

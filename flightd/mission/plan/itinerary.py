@@ -273,9 +273,9 @@ class Itinerary:
         self._stops[self._next : self._next + 1] = [first, *way[:-1], goal]
 
     def recount(self, now_ns: int, due: Sequence[str], *, returning: bool) -> None:
-        """Put visited nodes whose count was withdrawn before what is left, near as they are; they are left
-        for the next battery where the way leads home already."""
-        due = [node for node in due if node in self.visited]
+        """Put nodes whose count was withdrawn before what is left, near as they are; they are left for the
+        next battery where the way leads home already."""
+        due = self._done_of(due)
         if not due:
             return
         if not returning:
@@ -296,18 +296,30 @@ class Itinerary:
     def recount_next(self, now_ns: int, due: Sequence[str]) -> None:
         """Visit nodes again whose count was taken back, from the goal, at which the drone rests, as soon as
         its aisle is done; one that is led from node to node flies to none by itself."""
-        due = [node for node in due if node in self.visited]
-        if not due or self._waits:
+        due = [] if self._waits else self._reached_of(now_ns, self._done_of(due))
+        if not due:
             return
-        try:
-            aisle = self._site.nodes[self.goal.node].aisle
-            here = list(itertools.takewhile(lambda node: self._site.nodes[node].aisle == aisle, self.ahead))
-            rest = self._onward(self.goal, [*here, *due, *self.ahead[len(here) :]])
-        except NoWayError as err:
-            self._leave_out(now_ns, due, err)
-            return
+        aisle = self._site.nodes[self.goal.node].aisle
+        here = list(itertools.takewhile(lambda node: self._site.nodes[node].aisle == aisle, self.ahead))
+        rest = self._onward(self.goal, [*here, *due, *self.ahead[len(here) :]])
         self._stops[self._next + 1 :] = rest.stops
         self._note_recount(now_ns, due)
+
+    def _done_of(self, nodes: Sequence[str]) -> list[str]:
+        """Those that were visited, or that an earlier flight of the count has done: the others lie ahead."""
+        return [node for node in nodes if node in self.visited or node not in self.remaining]
+
+    def _reached_of(self, now_ns: int, nodes: Sequence[str]) -> list[str]:
+        """Those to which open lines lead from the goal; of the others it is told that they are left out."""
+        reached = []
+        for node in nodes:
+            try:
+                self._site.path(self.goal.node, node, against_one_way=True)
+            except NoWayError as err:
+                self._leave_out(now_ns, [node], err)
+            else:
+                reached.append(node)
+        return reached
 
     def _note_recount(self, now_ns: int, due: Sequence[str]) -> None:
         self.visited = [node for node in self.visited if node not in due]

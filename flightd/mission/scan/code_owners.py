@@ -1,4 +1,4 @@
-"""At which places a flight has found each single thing.  Pure.
+"""At which places a count has found each single thing.  Pure.
 
 One thing cannot be at two places: what is found at both counts at neither until both were looked at again.
 What that shows counts, for then there is a label at each.
@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from flightd.core.scanning import Finding
+from flightd.core.scanning import CountedPlace, Finding
+from flightd.core.types import CodeRead
 from flightd.mission.scan.code_identity import names_one_thing
 
 
@@ -31,17 +32,25 @@ class Contradiction:
 
 
 class CodeOwners:
-    """Call `take` for each finding, whichever way it came, and `forget` for those that count no more."""
+    """Call `take` for each finding, whichever way it came, and `forget` for those that count no more; `book`
+    first, where earlier flights have counted a part."""
 
     def __init__(self) -> None:
         self._places: dict[str, set[str]] = {}
         self._again: set[str] = set()
         self._at_many: set[str] = set()
 
+    def book(self, counted: Iterable[CountedPlace]) -> None:
+        """Earlier flights have counted these.  What they booked at two places surely hangs at both."""
+        for place in counted:
+            for text in _things(place.reads):
+                self._places.setdefault(text, set()).add(place.location)
+        self._at_many |= {text for text, at in self._places.items() if len(at) > 1}
+
     def take(self, found: Finding) -> Contradiction | None:
         """What contradicts the finding, which is the place's own unless it is to be looked at again."""
         # a text that hangs at two places surely names no single thing
-        texts = {read.text for read in found.reads if names_one_thing(read)} - self._at_many
+        texts = _things(found.reads) - self._at_many
         twice = {text for text in texts if self._places.get(text, set()) - {found.location}}
         others = {place for text in twice for place in self._places[text]} - {found.location}
         again = ({found.location} | others) - self._again if others else set()
@@ -64,3 +73,7 @@ class CodeOwners:
 
     def _drop(self, places: set[str]) -> None:
         self._places = {text: left for text, at in self._places.items() if (left := at - places)}
+
+
+def _things(reads: Iterable[CodeRead]) -> set[str]:
+    return {read.text for read in reads if names_one_thing(read)}

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
 from flightd.core.planned_flight import PlannedSweep
-from flightd.core.scanning import BodyPose, CodeSet, Finding, Place, Settled
+from flightd.core.scanning import BodyPose, CodeSet, CountedPlace, Finding, Place, Settled
 from flightd.core.types import Event
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.sweep_leg import SweepLeg
@@ -52,7 +52,7 @@ class NoScan:
     def count_anew(self) -> None:
         """Nothing is counted anyway."""
 
-    def skip(self, locations: Iterable[str]) -> None:
+    def go_on_with(self, counted: Iterable[CountedPlace]) -> None:
         """Nothing is counted anyway."""
 
     def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:

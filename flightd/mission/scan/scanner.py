@@ -9,12 +9,12 @@ nothing is ever booked on a wrong location; its locations are left to count, and
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from flightd.config.scan import ScanConfig
 from flightd.core.planned_flight import PlannedSweep
-from flightd.core.scanning import BodyPose, CodeSet, Finding, PictureWorth, Place, Settled
+from flightd.core.scanning import BodyPose, CodeSet, CountedPlace, Finding, PictureWorth, Place, Settled
 from flightd.core.types import Event, EventLevel
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.plan.sweep_leg import SweepLeg
@@ -155,9 +155,12 @@ class Scanner:
         among = self._planned
         self._wanted = frozenset(code for code in among if self._levels[code] in levels) if levels else among
 
-    def skip(self, locations: Iterable[str]) -> None:
-        """These need no look any more: an earlier flight of the same count has booked them."""
-        self._done.update(self._planned.intersection(locations))
+    def go_on_with(self, counted: Iterable[CountedPlace]) -> None:
+        """Earlier flights of the same count have booked these: they need no look unless a code of theirs is
+        found elsewhere."""
+        booked = [place for place in counted if place.location in self._planned]
+        self._done.update(place.location for place in booked)
+        self._owners.book(booked)
 
     def count_anew(self) -> None:
         """Whatever was counted until now needs another look in the next flight."""
@@ -254,9 +257,9 @@ class Scanner:
         self._labels.trust()
 
     def take_due(self) -> tuple[str, ...]:
-        """The nodes to fly to once more, their findings having been withdrawn, in the order of their first
-        visit; each at most `revisits` times in a flight."""
-        return self._pending.take_due()
+        """The nodes with something to count to fly to once more, their findings having been withdrawn, in the
+        order of their first visit; each at most `revisits` times in a flight."""
+        return tuple(node for node in self._pending.take_due() if self._left(node))
 
     # Counting in passing
 
@@ -507,10 +510,3 @@ class Scanner:
 
 def _faces(leg: SweepLeg) -> list[Face]:
     return [(leg.aisle, leg.side, level) for level in leg.levels]
-
-
-def nodes_to_count(site: Site, nodes: Iterable[str], counted: Collection[str]) -> tuple[str, ...]:
-    """Those of some nodes that a flight which goes on with a count must still visit, in their order: the
-    ones with a location that is not `counted`."""
-    left = {location.node for location in site.locations.values() if location.code not in counted}
-    return tuple(node for node in nodes if node in left)

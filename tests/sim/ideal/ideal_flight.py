@@ -16,7 +16,7 @@ from flightd.app.tick import Tick
 from flightd.config.schema import Config
 from flightd.core.flight_order import FlightOrder
 from flightd.core.geometry import wrap_pi, yaw_rate
-from flightd.core.scanning import CodeSet
+from flightd.core.scanning import CodeSet, CountedPlace
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickOutput
 from flightd.core.types import (
@@ -174,7 +174,7 @@ class IdealFlight:
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
         self._battery_swapper = BatterySwapper(site, self.airframe, swap_s) if swap_s else None
-        self.counted: tuple[str, ...] = ()
+        self.counted: tuple[CountedPlace, ...] = ()
         self.on_record: Callable[[str, int, object], None] = lambda _topic, _stamp_ns, _message: None
         self.on_tick: Callable[[Phase, int], None] = lambda _phase, _now_ns: None
 
@@ -263,7 +263,7 @@ class IdealFlight:
         orders, self.commands = self.commands, []
         return orders
 
-    def _take_counted(self) -> tuple[str, ...]:
+    def _take_counted(self) -> tuple[CountedPlace, ...]:
         counted, self.counted = self.counted, ()
         return counted
 

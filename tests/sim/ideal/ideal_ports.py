@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 from flightd.app.absent_parts import NoCounting, NoGround, NoRecorder
 from flightd.app.flight import Tasks
-from flightd.core.scanning import CodeSet
+from flightd.core.scanning import CodeSet, CountedPlace
 from flightd.core.types import (
     Attitude,
     AttitudeSetpoint,
@@ -145,14 +145,16 @@ class IdealGround(NoGround):
 class IdealCount(NoCounting):
     """Codes that are read and locations that were counted before."""
 
-    def __init__(self, codes: Callable[[], tuple[CodeSet, ...]], counted: Callable[[], tuple[str, ...]]):
+    def __init__(
+        self, codes: Callable[[], tuple[CodeSet, ...]], counted: Callable[[], tuple[CountedPlace, ...]]
+    ) -> None:
         self._codes = codes
         self._counted = counted
 
     def take(self) -> tuple[CodeSet, ...]:
         return self._codes()
 
-    def take_counted(self) -> tuple[str, ...]:
+    def take_counted(self) -> tuple[CountedPlace, ...]:
         return self._counted()
 
 

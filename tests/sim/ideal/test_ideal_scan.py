@@ -15,7 +15,7 @@ from flightd.config.mission import Heading
 from flightd.config.schema import load_config
 from flightd.config.sweep import ScanMode
 from flightd.core.inventory import LocationState
-from flightd.core.scanning import Finding
+from flightd.core.scanning import CountedPlace, Finding
 from flightd.core.types import Command, CommandKind, EventLevel, Phase
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
@@ -116,7 +116,7 @@ def test_going_home_ends_the_scan_at_once() -> None:
 
 def test_locations_counted_before_are_not_looked_at_again() -> None:
     flight = scan_flight()
-    flight.counted = tuple(PLACES[:-1])
+    flight.counted = tuple(map(CountedPlace, PLACES[:-1]))
     flown = flight.fly()
     assert flown.visited == list(NODES)
     assert set(findings(flown)) == {PLACES[-1]}

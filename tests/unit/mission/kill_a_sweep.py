@@ -8,8 +8,9 @@ or before the first.  A count that is complete is followed by another, under a n
 two places.
 
 Prints one JSON document: kills, writes that were told before a kill, how many of those were lost, places with
-more than one look that counts, looks at what counted already, bookings that were contradicted, those of them
-that count still, files that did not open sound, counts that were completed.  Killing uses fork, so this is a
+more than one look that counts, looks at what counted already and was not contradicted, bookings that were
+contradicted, those of them that count still, places of that pallet that were looked at once in a completed
+count, files that did not open sound, counts that were completed.  Killing uses fork, so this is a
 program of its own.
 """
 
@@ -75,7 +76,7 @@ async def _count(store: SqliteStore, run: str) -> None:
     stock = labels_of(SITE) | {code: [Label("PALLET 9")] for code in _TWICE}
     labels = {code: [*found, Label(code, -0.15)] for code, found in stock.items()}
     flight = Sweep(stock=Stock(labels))
-    flight.scanner.skip(store.counted(run))
+    flight.scanner.go_on_with(store.counted(run))
     clock = LoopClock()
     with StoreWriter(store, run, time.time_ns(), clock, print) as writer:
         writing = asyncio.create_task(writer.run(print))
@@ -125,12 +126,12 @@ def main() -> None:
     seen: dict[str, tuple[str, str]] = {}
     sure: set[tuple[str, str]] = set()
     taken: set[str] = set()
-    killed = lost = double = again = contradicted = stood = unsound = 0
+    killed = lost = double = again = contradicted = stood = once = unsound = 0
     run = 1
     while killed < kills:
         name = f"count-{run}"
         with SqliteStore(folder) as store:
-            counted = store.counted(name)
+            counted = {place.location for place in store.counted(name)}
             before = {look.id for code in counted for look in store.history(code) if look.run == name}
         lines, was_killed = _killed(folder, name, rng)
         killed += was_killed
@@ -157,14 +158,20 @@ def main() -> None:
         lost += len(seen.keys() - {row[0] for row in held}) + len(sure - booked.keys())
         stood = len(taken & {id_ for id_, *_, standing in held if standing == 1})
         double += sum(count > 1 for count in booked.values())
-        again += sum(of == name and code in counted and id_ not in before for id_, of, code, _ in held)
-        run += all((name, code) in booked for code in SITE.locations)
+        again += sum(
+            of == name and code in counted and id_ not in before and code not in _TWICE
+            for id_, of, code, _ in held
+        )
+        if all((name, code) in booked for code in SITE.locations):
+            looks = Counter(code for _, of, code, _ in held if of == name)
+            once += sum(looks[code] == 1 for code in _TWICE)
+            run += 1
     print(
         json.dumps(
             {
                 "kills": killed, "writes": len(seen) + len(sure), "lost": lost, "double": double,
-                "again": again, "contradicted": contradicted, "stood": stood, "unsound": unsound,
-                "completed": run - 1,
+                "again": again, "contradicted": contradicted, "stood": stood, "once": once,
+                "unsound": unsound, "completed": run - 1,
             }
         )
     )  # fmt: skip

@@ -14,6 +14,7 @@ from flightd.config.battery import BatteryConfig
 from flightd.config.mission import Heading
 from flightd.config.scan import ScanConfig
 from flightd.core.errors import InputError
+from flightd.core.scanning import CountedPlace
 from flightd.mission.battery.consumption import BatteryGauge
 from flightd.mission.battery.sorties import Sorties, check_battery
 from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
@@ -100,7 +101,7 @@ def test_what_is_left_to_count_at_a_stop_counts_as_flying_time() -> None:
     for charge, short in ((needed + 0.002, False), (needed - 0.002, True)):
         counting.step(0, charge, False)
         assert (counting.must_not_go_on("A2", "A3") is not None) is short
-    scanner.skip(shelves.SITE.locations)
+    scanner.go_on_with(map(CountedPlace, shelves.SITE.locations))
     assert counting.must_not_go_on("A2", "A3") is None, "nothing left: a plain stop"
 
 

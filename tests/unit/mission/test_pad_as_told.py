@@ -10,6 +10,7 @@ import pytest
 from flightd.config.battery import BatteryConfig
 from flightd.config.scan import ScanConfig
 from flightd.core.errors import InputError
+from flightd.core.scanning import CountedPlace
 from flightd.core.types import CommandKind, Phase
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
@@ -130,7 +131,7 @@ def test_a_shared_pad_is_written_and_read_and_nobody_starts_there_at_first() -> 
 def test_its_next_flight_counts_anew_what_an_earlier_one_has_counted() -> None:
     scanner = unseeing()
     flight = flown(scanner=scanner)
-    scanner.skip(HALL.locations)
+    scanner.go_on_with(map(CountedPlace, HALL.locations))
     assert not scanner.wants("A2")
     flight.order(GOTO, "A3", lands=True)
     assert flight.land() is Phase.PREFLIGHT

@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import pytest
 
+from flightd.app.flight_orders import nodes_to_count
 from flightd.core.inventory import LocationState
-from flightd.core.scanning import Light, Occupancy
-from flightd.mission.scan.scanner import Scanner, nodes_to_count
+from flightd.core.scanning import CountedPlace, Light, Occupancy
+from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import View
 from flightd.site.racks import code_form
 from flightd.site.ways import KeepOut
@@ -218,7 +219,7 @@ def test_a_count_that_goes_on_visits_only_what_is_left() -> None:
     counted = {place.code for place in SITE.locations.values() if place.node != "A3"}
     assert nodes_to_count(SITE, ("A1", "A2", "A3", "A4"), counted) == ("A3",)
     scanner = Scanner(SITE, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
-    scanner.skip(counted)
+    scanner.go_on_with(map(CountedPlace, counted))
     assert not scanner.wants("A2")
     assert scanner.wants("A3")
 

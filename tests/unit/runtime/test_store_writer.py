@@ -11,7 +11,7 @@ from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.counting.store_writer import StoreWriter
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, PlannedLocation
-from flightd.core.scanning import Finding, Settled
+from flightd.core.scanning import CountedPlace, Finding, Settled
 from flightd.core.types import CodeRead
 from flightd.runtime.clock import LoopClock
 from tests.rigs.event_loops import real, virtual
@@ -56,7 +56,7 @@ class StubbornStore:
     def withdraw_pending(self, run: str) -> None:
         self._store.withdraw_pending(run)
 
-    def counted(self, run: str) -> frozenset[str]:
+    def counted(self, run: str) -> tuple[CountedPlace, ...]:
         return self._store.counted(run)
 
     def locations(self) -> list[LocationRecord]:
@@ -102,7 +102,7 @@ def test_a_contradicted_booking_is_withdrawn_on_the_disk(tmp_path: Path) -> None
 
     with SqliteStore(tmp_path) as store:
         virtual(main(store))
-        assert store.counted("run") == frozenset()
+        assert store.counted("run") == ()
 
 
 def test_a_disk_that_refuses_is_told_and_tried_again(tmp_path: Path) -> None:

@@ -1,0 +1,89 @@
+"""A count that another flight goes on with: what was booked before is compared with what is found now."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection
+from dataclasses import replace
+
+import pytest
+
+from flightd.config.sweep import ScanMode
+from flightd.core.scanning import CountedPlace
+from flightd.core.types import Command, CommandKind
+from flightd.site.site import Site
+from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
+from tests.unit.mission.shelves import BARE_ENDS, SIGHT, read
+from tests.unit.mission.test_sweep_flight import Sweep, booked_of, config, flight_order, labels_of
+
+ONE, OTHER = "AL-02-2-2", "CR-04-1-1"
+LABELS = labels_of(BARE_ENDS) | {code: [Label("PALLET 9")] for code in (ONE, OTHER)}
+AT_C4 = {place.code for place in BARE_ENDS.locations.values() if place.node == "C4"}
+
+
+def going_on(
+    left: Collection[str],
+    site: Site = BARE_ENDS,
+    mode: ScanMode = ScanMode.STOP,
+    levels: tuple[int, ...] = (),
+) -> Sweep:
+    """A flight to the nodes at which places were left uncounted; the others were read as they are."""
+    by_order = {"autostart": False, "start_countdown_s": 0.0}
+    flight = Sweep(config().with_values(scan={"mode": mode}, mission=by_order), Stock(LABELS), site)
+    counted = [
+        CountedPlace(code, (read(LABELS[code][0].text),)) for code in site.locations if code not in left
+    ]
+    flight.scanner.go_on_with(counted)
+    nodes = tuple(dict.fromkeys(site.locations[code].node for code in left))
+    flight.mission.command(Command("1", CommandKind.PLAN, nodes=nodes, levels=levels), flight.now_ns)
+    flight.run(0.2)
+    flight.order(CommandKind.START)
+    return flight
+
+
+@pytest.mark.parametrize("mode", ScanMode)
+def test_a_pallet_that_was_booked_elsewhere_is_looked_for_at_both_places_again(mode: ScanMode) -> None:
+    flight = going_on(AT_C4, mode=mode)
+    flight.fly(900.0, until=lambda: bool(flight.said("contradiction")))
+    withdrawn = [code for one in flight.settled if one.booked for code in one.locations]
+    assert sorted(withdrawn) == [ONE, OTHER]
+    flight.fly(900.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    a, b = flight_order(flight, ONE, OTHER)
+    assert flight.said("contradiction") == [
+        f"one code at {ONE} and {OTHER}: to be looked at again",
+        f"one code at {a} and {b}: counted at each",
+    ]
+    assert flight.said("recount") == ["A2, C4 to visit again"]
+    assert Counter(booked_of(flight)) == Counter([ONE, *AT_C4])
+    found = Counter(finding.location for finding in flight.findings)
+    assert found == Counter([ONE, OTHER, *AT_C4])
+
+
+def test_what_hangs_at_two_places_as_earlier_flights_found_is_asked_about_no_more() -> None:
+    flight = going_on(AT_C4 - {OTHER})
+    third = min(AT_C4 - {OTHER})
+    flight.front = IdealFront(BARE_ENDS, SIGHT, Stock(LABELS | {third: [Label("PALLET 9")]}))
+    flight.fly(900.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert flight.said("contradiction") == []
+    assert sorted(booked_of(flight)) == sorted(AT_C4 - {OTHER})
+
+
+def test_a_place_on_a_level_that_is_not_counted_now_is_withdrawn_and_left() -> None:
+    flight = going_on(AT_C4, levels=(1,))
+    flight.fly(900.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert len(flight.said("contradiction")) == 1
+    assert flight.said("recount") == ["C4 to visit again"]
+    assert ONE in {code for one in flight.settled if one.booked for code in one.locations}
+    assert ONE not in flight.states
+
+
+def test_a_place_to_which_no_open_way_leads_is_told_and_the_other_looked_at_again() -> None:
+    closed = replace(BARE_ENDS, blocked=(("A1", "A2"), ("A2", "A3")))
+    flight = going_on(AT_C4, closed)
+    flight.fly(900.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert [text.split(":")[0] for text in flight.said("recount")] == ["A2 left out", "C4 to visit again"]
+    assert sorted(booked_of(flight)) == sorted(AT_C4)
