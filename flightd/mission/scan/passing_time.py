@@ -21,8 +21,8 @@ class PassingTime:
         flown past for one of them."""
         of = tuple(nodes), left, pace
         if of != self._of:  # asked of one node of an aisle after the other
-            legs = self._sweeps.legs(nodes, left, nodes[0], 0.0, pace.height_m)
-            counted = {self._node_of[code] for leg in legs for code in leg.locations}
-            share_s = self._sweeps.seconds(legs, pace, 0.0) / max(len(counted), 1)
+            passes = list(self._sweeps.stop_by_stop(nodes, left, 0.0, pace.height_m))
+            counted = {self._node_of[code] for legs in passes for leg in legs for code in leg.locations}
+            share_s = sum(self._sweeps.seconds(legs, pace, 0.0) for legs in passes) / max(len(counted), 1)
             self._of, self._share_s = of, dict.fromkeys(counted, share_s)
         return self._share_s.get(node, 0.0)

@@ -279,7 +279,7 @@ class Scanner:
         before: frozenset[str] = frozenset()
         for run in runs:
             codes = frozenset(code for node in run for code in self.places_at(node, levels)) - before
-            lanes += self._sweeps.judged(run, codes, run[0], 0.0, 0.0)
+            lanes += self._sweeps.judged(run, codes, 0.0, 0.0)
             before |= codes
         return told(lanes)
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import BodyPose
+from flightd.mission.plan.itinerary import in_best_order
 from flightd.mission.plan.leg_times import Pace, profile_s
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.code_assignment import Assigner
@@ -104,16 +105,50 @@ class SweepPlanner:
         legs = [_leg(way.lane, way.passed(nodes)) for way in ways]
         return (*legs[:-1], replace(legs[-1], last=True)) if legs else ()
 
+    def stop_by_stop(
+        self, run: Sequence[str], wanted: frozenset[str], yaw_rad: float, height_m: float
+    ) -> Iterator[tuple[SweepLeg, ...]]:
+        """What `legs` answers a drone that visits the nodes `run` of one aisle in this order and asks at each
+        stop anew, as a flight does: what could not be flown past from one may be from the next."""
+        nodes, left, rest = self._nodes(run[0]), wanted, tuple(run)
+        while self._may_pass(nodes, rest, left):
+            here = rest[0]
+            legs = self.legs(rest, left, here, yaw_rad, height_m)
+            passed = {code for leg in legs for code in leg.locations}
+            if legs:
+                yield legs
+                here = legs[-1].end
+            left -= passed or {code for code in left if self._node(code) == here}
+            due = [node for node in rest if any(self._node(code) == node for code in left)]
+            rest = tuple(due)
+            if legs and due:
+                rest, _ = in_best_order(self._site, here, due, (), self._site.home.node)
+
     def judged(
-        self, run: Sequence[str], wanted: frozenset[str], here: str, yaw_rad: float, height_m: float
+        self, run: Sequence[str], wanted: frozenset[str], yaw_rad: float, height_m: float
     ) -> list[JudgedLane]:
-        """All lanes of what `legs` is asked for, in the order of `lanes`, and which of them it flies past."""
-        lanes, nodes = self._lanes_at(run, wanted, here), self._nodes(here)
-        flown = [way.lane for way in self._ways(nodes, lanes, here, yaw_rad, height_m)]
-        return [
-            JudgedLane(lane, None if lane in flown else self._hindrance(nodes, lane) or StopCause.LINE)
-            for lane in lanes
-        ]
+        """All lanes past what is wanted at the nodes `run`, in the order of `lanes`, and which of them are
+        flown past from stop to stop: of a lane that is so beyond its first nodes only, each part."""
+        nodes = self._nodes(run[0])
+        judged = []
+        legs = [leg for flown in self.stop_by_stop(run, wanted, yaw_rad, height_m) for leg in flown]
+        passed = {code for leg in legs for code in leg.locations}
+        for lane in self._lanes_at(run, wanted, run[0]):
+            flown = tuple(place for place in lane.places if place.code in passed)
+            stopped = tuple(place for place in lane.places if place.code not in passed)
+            why = self._hindrance(nodes, lane) or StopCause.LINE
+            parts = (flown, None), (stopped, why)
+            judged += [JudgedLane(replace(lane, places=part), cause) for part, cause in parts if part]
+        return judged
+
+    def _may_pass(self, nodes: Sequence[str], run: Sequence[str], wanted: frozenset[str]) -> bool:
+        """Whether anything is left at the nodes `run` that can be flown past from some node."""
+        return bool(run) and any(
+            self._hindrance(nodes, lane) is None for lane in self._lanes_at(run, wanted, run[0])
+        )
+
+    def _node(self, code: str) -> str:
+        return self._site.locations[code].node
 
     def _nodes(self, here: str) -> list[str]:
         """Those of the aisle of a node, along it."""
@@ -121,7 +156,7 @@ class SweepPlanner:
 
     def _lanes_at(self, run: Sequence[str], wanted: frozenset[str], here: str) -> list[Lane]:
         """Past what is wanted at the nodes `run`."""
-        counted = [code for code in wanted if self._site.locations[code].node in set(run)]
+        counted = [code for code in wanted if self._node(code) in set(run)]
         return self.lanes(self._site.nodes[here].aisle, counted)
 
     def _ways(

@@ -19,7 +19,7 @@ from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Settled
 from flightd.core.types import CommandKind, Event, LandedState, Phase
 from flightd.mission import chosen_plan
-from flightd.mission.plan.flight_plan import HeadingPolicy
+from flightd.mission.plan.flight_plan import HeadingPolicy, runs_of
 from flightd.mission.plan.leg_times import Pace, profile_s
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.scanner import Scanner
@@ -272,6 +272,22 @@ def test_aisle_after_aisle_is_flown_past_with_one_half_turn_each_and_no_way_out_
     assert not flight.scanned
     assert [node[0] for node, _ in flight.turned] == ["A", "B", "C"], "from one side to the other"
     assert len(flight.legs) == 12
+
+
+@pytest.mark.parametrize("shut", [("A1", "A2"), ("A4", "A5")], ids=["its first line", "its last"])
+def test_an_aisle_of_which_one_line_is_one_way_is_flown_past_as_far_as_the_plan_says(
+    shut: tuple[str, str],
+) -> None:
+    edges = (replace(edge, one_way=(edge.a, edge.b) == shut) for edge in BARE_ENDS.edges)
+    site = replace(BARE_ENDS, edges=tuple(edges))
+    flight = Sweep(site=site)
+    sweeps = flight.scanner.told_sweeps(runs_of(site, flight.mission.plan.stops))
+    flight.fly(900.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    flown = {code for leg in flight.legs for code in leg.locations}
+    assert sum(told.places for told in sweeps if told.swept) == len(flown)
+    assert sum(told.places for told in sweeps) == len(site.locations)
+    assert {told.swept for told in sweeps if "A" in told.aisles} == {True, False}
 
 
 @pytest.mark.parametrize(

@@ -194,7 +194,7 @@ def test_a_one_way_aisle_is_counted_by_stopping() -> None:
 
 
 def test_the_plan_says_once_what_is_alike_and_what_limits_it() -> None:
-    first, second = told(PLANNER.judged(NODES, ALL, "A1", 0.0, 0.0))
+    first, second = told(PLANNER.judged(NODES, ALL, 0.0, 0.0))
     assert (first.levels, second.levels, first.places + second.places) == ((1,), (2,), len(ALL))
     assert first.limit == "cruise"
     assert "mission.speed_mps" in first.text
@@ -222,7 +222,7 @@ def test_the_plan_says_of_what_is_not_flown_past_why(
     planner = sweeps(site, config=configured().with_values(scan={"sweep": sweep}))
     codes = frozenset(site.locations)
     assert not planner.legs(run, codes, run[0], 0.0, 0.0)
-    sweeps_told = told(planner.judged(run, codes, run[0], 0.0, 0.0))
+    sweeps_told = told(planner.judged(run, codes, 0.0, 0.0))
     assert not any(each.swept for each in sweeps_told)
     assert json.dumps([asdict(each) for each in sweeps_told], allow_nan=False)
     texts = [each.text for each in sweeps_told if each.stops_for == why]
@@ -236,7 +236,7 @@ def test_the_plan_says_of_what_is_not_flown_past_why(
     st.lists(st.sampled_from(NODES), min_size=1, max_size=4, unique=True),
 )
 def test_what_is_told_as_flown_past_is_what_is_flown_past(wanted: set[str], run: list[str]) -> None:
-    judged = PLANNER.judged(run, frozenset(wanted), run[0], 0.0, 0.0)
+    judged = PLANNER.judged(run, frozenset(wanted), 0.0, 0.0)
     legs = PLANNER.legs(run, frozenset(wanted), run[0], 0.0, 0.0)
     flown = {(one.lane.side, one.lane.levels) for one in judged if one.stops_for is None}
     assert flown == {(leg.side, leg.levels) for leg in legs}
