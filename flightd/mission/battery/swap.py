@@ -58,8 +58,8 @@ class BatterySwap:
 
     @property
     def _done(self) -> int:
-        """Grows with each node that is visited and each place that is counted."""
-        return len(self._route.visited) + self._scanner.decided
+        """Grows with each visit to a node and each look at a place, also with those that are taken back."""
+        return self._route.visits + self._scanner.looks
 
     @property
     def endurance_s(self) -> tuple[float, float]:

@@ -41,6 +41,8 @@ class Itinerary:
         self.stand = (plan.start, plan.start_yaw_rad)
         """The node on which the drone stands before it flies, and its heading there."""
         self.visited: list[str] = []
+        self.visits = 0
+        """How often a node was visited; of those in `visited` some may be taken out again."""
         self._run: tuple[str, ...] = ()
         self._waits = plan.waits
         self._told_pad = ""
@@ -145,6 +147,7 @@ class Itinerary:
         """The goal was visited, if it was a wanted one."""
         if self.goal.visit:
             self.visited.append(self.goal.node)
+            self.visits += 1
             self._events.report(now_ns, EventLevel.INFO, "visited", self.goal.node)
 
     # Counting in passing
@@ -171,6 +174,7 @@ class Itinerary:
         if any(node in leg.nodes for leg in later) or abs(pose.along_m) > _OVER_NODE_M:
             return
         self.visited += [node] * self._run.count(node)
+        self.visits += 1
         self._events.report(now_ns, EventLevel.INFO, "visited", node)
 
     def visit_undecided(self, now_ns: int) -> None:

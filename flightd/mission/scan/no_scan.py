@@ -26,7 +26,7 @@ class NoScan:
     blind = None
     doubted = False
     looking = False
-    decided = 0
+    looks = 0
     sweeps = False
     evidence: frozenset[str] = frozenset()
 

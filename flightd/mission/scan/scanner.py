@@ -80,6 +80,8 @@ class Scanner:
         self._relights = True
         self._by_stopping = False
         self.doubted = False
+        self.looks = 0
+        """How many findings were made, also those that count no more."""
 
     # What the mission asks
 
@@ -116,11 +118,6 @@ class Scanner:
         if not self._begun or self._begun_blind < min(_BLIND_NODES, self._begun):
             return None
         return NothingRead(self._begun_blind, self._begun)
-
-    @property
-    def decided(self) -> int:
-        """How many locations are counted."""
-        return len(self._done)
 
     def wants(self, node: str) -> bool:
         """Whether locations of a node are left to count."""
@@ -485,6 +482,7 @@ class Scanner:
         """A finding, whichever way it came.  The places that it takes back, maybe its own: they are counted
         again, by stopping."""
         self._found.append(found)
+        self.looks += 1
         self._done.add(found.location)
         against = self._owners.take(found)
         if against is None:

@@ -10,7 +10,7 @@ import pytest
 
 from flightd.config.sweep import ScanMode
 from flightd.core.scanning import CountedPlace
-from flightd.core.types import Command, CommandKind
+from flightd.core.types import Command, CommandKind, Phase
 from flightd.site.site import Site
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import BARE_ENDS, SIGHT, read
@@ -29,7 +29,8 @@ def going_on(
 ) -> Sweep:
     """A flight to the nodes at which places were left uncounted; the others were read as they are."""
     by_order = {"autostart": False, "start_countdown_s": 0.0}
-    flight = Sweep(config().with_values(scan={"mode": mode}, mission=by_order), Stock(LABELS), site)
+    params = config().with_values(scan={"mode": mode}, mission=by_order, battery={"swap": True})
+    flight = Sweep(params, Stock(LABELS), site)
     counted = [
         CountedPlace(code, (read(LABELS[code][0].text),)) for code in site.locations if code not in left
     ]
@@ -87,3 +88,31 @@ def test_a_place_to_which_no_open_way_leads_is_told_and_the_other_looked_at_agai
     assert flight.mission.state.on_pad, flight.mission.reason
     assert [text.split(":")[0] for text in flight.said("recount")] == ["A2 left out", "C4 to visit again"]
     assert sorted(booked_of(flight)) == sorted(AT_C4)
+
+
+def came_down(flight: Sweep) -> Phase:
+    """What becomes of a flight whose battery is low now."""
+    flight.set(battery_frac=0.15)
+    flight.fly(900.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    flight.down()
+    return flight.phase
+
+
+def test_a_battery_on_which_more_was_taken_back_than_counted_is_not_the_last() -> None:
+    at_b3 = next(code for code, place in BARE_ENDS.locations.items() if place.node == "B3")
+    flight = going_on((at_b3, OTHER))
+    flight.fly(900.0, until=lambda: bool(flight.said("visited")))
+    assert came_down(flight) is Phase.SWAP
+    flight.set(battery_frac=0.9, height_m=0.1)
+    flight.run(0.2)
+    flight.order(CommandKind.START)
+    flight.fly(900.0, until=lambda: bool(flight.said("recount")))
+    assert came_down(flight) is Phase.SWAP
+    assert {"A2", "C4"} <= {*flight.mission.remaining}
+
+
+def test_what_an_earlier_flight_has_counted_is_nothing_done_on_the_battery_in_hand() -> None:
+    flight = going_on(AT_C4)
+    flight.fly(until=lambda: flight.phase is Phase.FOLLOW)
+    assert came_down(flight) is Phase.DONE
