@@ -86,7 +86,8 @@ class Place:
 class PlaceLook:
     """What one picture shows of one location; `evidence` names the picture of it (SHA-256), empty
     where none was made.
-    `fill` is None where it shows too little of the opening."""
+    `fill` is None where it shows too little of the opening; `code` says whether a code is there that is not
+    the location's own label."""
 
     location: str
     quad_px: Quad
@@ -95,6 +96,12 @@ class PlaceLook:
     evidence: str = ""
     light: Light = Light.FAIR
     fill: PlaceFill | None = None
+    code: bool = False
+
+    @property
+    def worth(self) -> PictureWorth:
+        """What the picture is worth to people."""
+        return PictureWorth(self.code, self.light is Light.FAIR, self.share)
 
 
 @dataclass(frozen=True, slots=True)

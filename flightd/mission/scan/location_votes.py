@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import combinations
 
 from flightd.core.inventory import LocationState, PlaceFill
-from flightd.core.scanning import NO_PICTURE, BodyPose, Finding, Light, Occupancy, PictureWorth, PlaceLook
+from flightd.core.scanning import NO_PICTURE, BodyPose, Finding, Light, Occupancy, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
 from flightd.mission.scan.code_votes import CodeVotes
 from flightd.mission.scan.fill_votes import FillVotes
@@ -97,10 +97,8 @@ class LocationVotes:
             self._pose = pose
         self.light = place.light if place is not None else self.light
         self._largest = max(self._largest, place.share if place is not None else 0.0)
-        if place is not None and place.evidence:
-            worth = PictureWorth(bool(reads), place.light is Light.FAIR, place.share)
-            if worth > self.kept:
-                self.kept, self._evidence = worth, place.evidence
+        if place is not None and place.evidence and place.worth > self.kept:
+            self.kept, self._evidence = place.worth, place.evidence
 
     def finding(self, final: bool) -> Finding | None:
         """The state, None while more looks may still tell; `final` forces one, and is None only where no

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from flightd.core.inventory import PlaceFill
-from flightd.core.scanning import CodeSet, Light, Occupancy, PictureWorth, Place, PlaceLook, Quad
+from flightd.core.scanning import CodeSet, Occupancy, Place, PlaceLook, Quad
 from flightd.core.types import CodeRead, Image
 from flightd.vision.shelf import empty_deck as deck
 from flightd.vision.shelf.code_reader import read_codes
@@ -110,11 +110,6 @@ def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> 
         occupancy = judge(core, white, partial(deck.is_seen, bgr, place.deck_px, core, white))
     x0, y0, x1, y1 = _box(place.quad_px, width, height)
     light = light_on(bgr[y0:y1, x0:x1], white)
-    has_code = any(_contains(place.quad_px, read) for read in reads)
-    is_better = PictureWorth(has_code, light is Light.FAIR, place.share) > place.kept
-    seen = x1 > x0 and y1 > y0
-    jpeg = evidence_jpeg(np.ascontiguousarray(bgr[y0:y1, x0:x1])) if is_better and seen else b""
-    name = picture_name(jpeg) if jpeg else ""
     opening = _opening(bgr, place, reads, white)
     fill = None if opening is None else opening.fill
     if occupancy is Occupancy.EMPTY:
@@ -124,7 +119,14 @@ def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> 
             occupancy = Occupancy.UNSURE
     elif occupancy is Occupancy.COVERED and opening is not None:
         fill = PlaceFill(None)
-    return PlaceLook(place.location, place.quad_px, place.share, occupancy, name, light, fill), jpeg
+    has_code = any(read.text != place.location and _contains(place.quad_px, read) for read in reads)
+    look = PlaceLook(
+        place.location, place.quad_px, place.share, occupancy, light=light, fill=fill, code=has_code
+    )
+    if not (look.worth > place.kept and x1 > x0 and y1 > y0):
+        return look, b""
+    jpeg = evidence_jpeg(np.ascontiguousarray(bgr[y0:y1, x0:x1]))
+    return replace(look, evidence=picture_name(jpeg)), jpeg
 
 
 def _opening(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> OpeningLook | None:

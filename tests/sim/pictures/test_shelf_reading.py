@@ -62,6 +62,23 @@ def test_no_picture_is_made_of_a_place_where_that_would_be_worth_no_more_than_th
     assert read_shelf(seen.picture, 0, 0, worse)[1] == all_kept
 
 
+def test_the_label_of_the_place_itself_makes_no_picture_worth_more() -> None:
+    assigner = Assigner(SITE, SIGHT)
+    labels = stock = 0
+    for seen in shelf_pictures(SITE, CAMERA, LOOK, SEED, ("A1", "A3")):
+        places = assigner.places(seen.pose, seen.view.locations)
+        kept = [replace(place, kept=PictureWorth(False, True, 1.0)) for place in places]
+        codes, made = read_shelf(seen.picture, 0, 0, kept)
+        read = assigner.look(codes, seen.pose, (seen.view.aisle, seen.view.side)).reads
+        with_stock = {placed.likeliest for placed in read}
+        assert {look.location for look in codes.places if look.code} <= with_stock
+        assert {look.evidence for look in codes.places if not look.code} <= {""}
+        labels += len({one.text for one in codes.reads} & {place.location for place in places} - with_stock)
+        stock += len(made)
+    assert labels >= 1
+    assert stock >= 2
+
+
 def test_empty_places_are_told_and_no_other_is_ever_called_empty(looks: Looks, truth: Truth) -> None:
     told = Counter(
         (truth[place.location].situation == StockSituation.EMPTY, place.occupancy)

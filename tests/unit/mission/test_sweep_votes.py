@@ -50,7 +50,7 @@ def verdict(
 ) -> Finding | Undecided:
     votes = SweepVotes(CODE, "A2", PARAMS, 1.0)
     for seq, (reads, occupancy) in enumerate(zip(views, seen, strict=False)):
-        look = PlaceLook(CODE, QUAD, share, occupancy, f"picture {seq}", light)
+        look = PlaceLook(CODE, QUAD, share, occupancy, f"picture {seq}", light, code=bool(reads))
         bearing = math.radians(step_deg * (seq - 2))
         here = pose(seq * 250_000_000)
         votes.add(seq, here, look, reads, bearing_rad=bearing, doubtful=doubtful)
@@ -81,7 +81,7 @@ def test_a_picture_of_the_place_is_kept_until_there_is_one_that_is_worth_more() 
     assert votes.kept < PictureWorth(False, False, 0.0)
 
     def kept(seq: int, share: float, reads: Sequence[PlacedRead], light: Light = Light.FAIR) -> PictureWorth:
-        look = PlaceLook(CODE, QUAD, share, GOODS, f"picture {seq}", light)
+        look = PlaceLook(CODE, QUAD, share, GOODS, f"picture {seq}", light, code=bool(reads))
         votes.add(seq, pose(seq), look, reads, bearing_rad=0.0)
         return votes.kept
 
