@@ -7,3 +7,6 @@ from typing import Final
 
 BRISK: Final[dict[str, float]] = {"dwell_s": 0.5, "climb_mps": 0.8, "land_mps": 0.7}
 """Keys of `mission`; both rates are within the shipped limits of `control`."""
+
+QUICK: Final = BRISK | {"speed_mps": 1.2, "accel_mps2": 1.0, "turn_rate_degps": 45.0}
+"""Where how it gets there does not matter either.  The turns are the fastest within those limits."""
