@@ -45,7 +45,7 @@ from tests.sim.ideal.test_ideal_scan import CONFIG, ONE_SIDED, scan_flight
 from tests.unit.mission.shelves import SITE
 
 PACKAGE = str(Path(flightd.__file__).parent)
-MANY = int(os.environ.get("FLIGHTD_FAILURES", "8"))
+MANY = int(os.environ.get("FLIGHTD_FAILURES", "4"))
 TOGETHER = 10
 """In one test: which functions there are takes a whole flight to find out."""
 APART = {Pilot.step.__code__, LastResort.step.__code__}

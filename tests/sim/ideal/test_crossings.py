@@ -31,7 +31,7 @@ UNIFORM = uniform_site()
 
 @pytest.mark.timeout(1200)
 def test_no_crossing_is_miscounted_unnoticed_although_lines_miss_and_false_ones_lie_about() -> None:
-    count = bench(int(os.environ.get("FLIGHTD_CROSSINGS", "500")))
+    count = bench(int(os.environ.get("FLIGHTD_CROSSINGS", "200")))
     assert count.undetected == 0
     assert count.availability >= 0.98
 

@@ -1,7 +1,11 @@
-"""A part of a longer code is never told as a short one, however often it is read so; short codes are read."""
+"""A part of a longer code is never told as a short one, however often it is read so; short codes are read.
+
+`FLIGHTD_LABELS=6` looks at so many pictures of each kind.
+"""
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 import cv2
@@ -22,6 +26,10 @@ PAPER, INK, CARDBOARD = 232, 28, 145
 HALVES = ("4094819312344", "4094864912346", "4026813312341", "1234567890128", "5012345678900")
 """The first three are a UPC-E of number system 1 with a true check digit by their left halves."""
 LEFT_HALF = 50
+BESIDE = (INK, CARDBOARD, 205, PAPER)
+ENDS = ((3, 50.2), (4, 50.8), (4, 52.5))
+"""Pixels of a module, and where the half ends, modules."""
+LABELS = int(os.environ.get("FLIGHTD_LABELS", "1"))
 STRONG = {"EAN-13", "UPC-A", "Code 128", "Code 93", "DataBar"}
 
 
@@ -47,10 +55,13 @@ def weak(picture: Image) -> list[str]:
     return [r.symbology for r in read_codes(picture) if r.believed and r.symbology not in STRONG]
 
 
-@pytest.mark.parametrize("beside", [INK, CARDBOARD, 205, PAPER])
+@pytest.mark.parametrize("beside", BESIDE)
 @pytest.mark.parametrize("text", HALVES)
 def test_half_an_ean_13_is_no_upc_e(text: str, beside: int) -> None:
-    for px, end in ((3, 50.2), (4, 50.8), (4, 52.5)):
+    """Each text with each end, and each end beside each brightness."""
+    first = HALVES.index(text) + BESIDE.index(beside)
+    for more in range(min(LABELS, len(ENDS))):
+        px, end = ENDS[(first + more) % len(ENDS)]
         assert weak(half(text, px, beside, end)) == []
 
 
@@ -64,7 +75,7 @@ def test_half_an_ean_13_is_a_upc_e_to_a_reader_of_bars_alone() -> None:
     assert [(code.symbology, code.believed, code.whole) for code in seen] == [("UPC-E", False, False)]
 
 
-@pytest.mark.parametrize("looks", range(6))
+@pytest.mark.parametrize("looks", range(1 + LABELS))
 def test_a_label_torn_in_the_simulator_is_read_as_no_other(looks: int) -> None:
     """The simulator's own paper and tear, on fronts from dark film to a white carton."""
     px_per_m = 2000.0
@@ -83,7 +94,7 @@ def test_a_label_torn_in_the_simulator_is_read_as_no_other(looks: int) -> None:
 @pytest.mark.parametrize("damage", [Damage.TORN, Damage.COVERED, Damage.BLOT, Damage.GLARE, Damage.CUT])
 @pytest.mark.parametrize("kind", [Kind.EAN_13, Kind.UPC_A])
 def test_no_damage_to_a_long_code_makes_a_short_one(kind: Kind, damage: Damage) -> None:
-    for seed in range(3):
+    for seed in range(LABELS):
         rng = np.random.default_rng([seed, len(damage)])
         label = DamagedLabel.drawn(Printed.drawn(kind, rng), damage, rng)
         assert weak(label.picture(Seen.drawn(rng), rng)) == []
