@@ -1,9 +1,9 @@
 """What the code reader costs for pictures without a code, in processor time of one core.
 
 `python -m tools.bench_reader [--pictures N] [--seed N] [FOLDER]`: rendered shelves whose goods have no
-labels, with the places that a stop looks at, and the pictures of a folder, if one is given.  Each as it is
-and shrunk to 640x480.  A unit is one cvtColor(BGR2HSV) of the same picture, measured in between: figures of
-busy hours and other machines can be compared by it.
+labels, with the places that a stop looks at, by cameras of 1, 2, 5 and 12 Mpx, and the pictures of a folder,
+if one is given.  The smallest and the folder's also shrunk to 640x480.  A unit is one cvtColor(BGR2HSV) of
+the same picture, measured in between: figures of busy hours and other machines can be compared by it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import cv2
 import numpy as np
 
 from flightd.config.scan import ScanConfig
+from flightd.core.geometry import Lens
 from flightd.core.scanning import BodyPose, PictureWorth, Place
 from flightd.core.types import Image
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
@@ -39,6 +40,8 @@ _UNLABELLED = StockShares(
     empty=0.1, tilted=0, glossy=0, several=0, torn=0, too_small=0, missing=0.9, occluded=0, dark=0
 )
 _SMALL = 640, 480
+_ENLARGED = 1.4, 2.2, 3.43
+"""Cameras of 2, 5 and 12 Mpx, of one of 1 Mpx."""
 _SUFFIXES = (".jpg", ".jpeg", ".png")
 _TURNS, _UNIT_TURNS = 2, 5
 """Each picture is timed so often, and the least counts: what else the machine does only adds."""
@@ -62,10 +65,11 @@ class Cost:
     mpx: float
 
 
-def shelves(count: int, seed: int) -> Iterator[Shelf]:
-    """So many views of shelves, the pose known exactly; pictures of the places are kept already, as they are
-    for all frames of a stop but the first."""
-    site, camera, rng = load_site(_SITE), FrontCamera(), random.Random(seed)
+def shelves(count: int, seed: int, enlarged: float = 1.0) -> Iterator[Shelf]:
+    """So many views of shelves by a camera with so many times the pixels each way, the pose known exactly;
+    pictures of the places are kept already, as they are for all frames of a stop but the first."""
+    site, rng, standard = load_site(_SITE), random.Random(seed), FrontCamera()
+    camera = replace(standard, lens=_enlarged(standard.lens, enlarged))
     look = replace(RackAppearance(), shares=_UNLABELLED, location_labels=False, in_part=0.5)
     sight = FrontSight(camera.lens, camera.mount)
     assigner = Assigner(site, sight)
@@ -79,6 +83,13 @@ def shelves(count: int, seed: int) -> Iterator[Shelf]:
         picture = renderer.render(Kinematics(number, *at, 0.0, 0.0, 0.0, *turned, 0.0, 0.0, 0.0), number)
         places = assigner.places(BodyPose(number, *at, *turned, 0.01, 0.01, 0.004, True), view.locations)
         yield Shelf(picture.copy(), tuple(replace(place, kept=_BEST) for place in places))
+
+
+def _enlarged(lens: Lens, times: float) -> Lens:
+    """The same field of view in more pixels."""
+    width_px, height_px = round(lens.width_px * times / 4) * 4, round(lens.height_px * times / 4) * 4
+    middle = (width_px - 1) / 2, (height_px - 1) / 2
+    return Lens(width_px, height_px, lens.fx_px * times, lens.fy_px * times, *middle)
 
 
 def small(picture: Image) -> Image:
@@ -128,7 +139,7 @@ def main() -> None:
     """Render or load, read, and print what it cost."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, nargs="?", help="pictures without a code")
-    parser.add_argument("--pictures", type=int, default=24, help="rendered ones")
+    parser.add_argument("--pictures", type=int, default=24, help="rendered ones of each size")
     parser.add_argument("--seed", type=int, default=1, help="of what they show")
     asked = parser.parse_args()
     cv2.setNumThreads(1)
@@ -136,6 +147,10 @@ def main() -> None:
     whole = [shelf.picture for shelf in seen]
     print(f"{sum(len(shelf.places) for shelf in seen) / len(seen):.1f} places in a picture")
     print(line("reader, places in view", shelf_cost(seen)))
+    for times in _ENLARGED:
+        larger = list(shelves(asked.pictures, asked.seed, times))
+        print(line("reader, places in view", shelf_cost(larger)))
+        print(line("codes, goods", cost([shelf.picture for shelf in larger])))
     files: list[Path] = []
     if asked.folder is not None:
         files = sorted(path for path in asked.folder.iterdir() if path.suffix.lower() in _SUFFIXES)
