@@ -105,6 +105,20 @@ class PlaceFill:
 
 
 @dataclass(frozen=True, slots=True)
+class UndecidedCode:
+    """What was read beside a place's codes and does not count: too few `looks`, the pictures that gave it,
+    agree on it, or it may be a part of a longer code.  Something hangs there; what it says is not known."""
+
+    symbology: str
+    text: str
+    looks: int
+
+    def __post_init__(self) -> None:
+        if self.looks < 1:
+            raise ValueError(f"a code of {self.looks} looks")
+
+
+@dataclass(frozen=True, slots=True)
 class Observation:
     """One look at one location: its state, what was read, from where, and how sure (0..1).
 
@@ -113,6 +127,9 @@ class Observation:
     values of printed text in the picture: they may be looked for later, and do not change the `id`, nor does
     `fill`, which is None where it was not asked, nor `again`: its flight had seen the location before, and
     that had decided nothing.
+
+    Nor do the codes that stayed `undecided` change it: they are no part of what was counted, and one look is
+    the same look where a program that does not know of them has kept it or passed it on.
     """
 
     run: str
@@ -126,6 +143,7 @@ class Observation:
     texts: tuple[LabelValue, ...] = ()
     fill: PlaceFill | None = None
     again: bool = False
+    undecided: tuple[UndecidedCode, ...] = ()
 
     def __post_init__(self) -> None:
         texts = {read.text for read in self.reads}

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from flightd.core.inventory import LocationState, PlaceFill
+from flightd.core.inventory import LocationState, PlaceFill, UndecidedCode
 from flightd.core.types import CodeRead
 
 Quad: TypeAlias = tuple[tuple[float, float], ...]
@@ -161,6 +161,7 @@ class Finding:
     yaw_rad: float
     fill: PlaceFill | None = None
     again: bool = False
+    undecided: tuple[UndecidedCode, ...] = ()
 
     def __post_init__(self) -> None:
         if not all(map(math.isfinite, (self.x_m, self.y_m, self.height_m, self.yaw_rad))):

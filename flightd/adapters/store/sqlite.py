@@ -28,6 +28,7 @@ from flightd.adapters.store.label_texts import (
 )
 from flightd.adapters.store.place_fills import CASE_COLUMNS, FILL_TABLES, LEAN_COLUMN, keep_fill, kept_fills
 from flightd.adapters.store.read_only import connect_read_only
+from flightd.adapters.store.undecided_codes import UNDECIDED_TABLES, keep_undecided, kept_undecided
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
     CountPose,
@@ -37,19 +38,24 @@ from flightd.core.inventory import (
     PlaceFill,
     PlannedLocation,
     Standing,
+    UndecidedCode,
 )
 from flightd.core.label_values import LabelValue
 from flightd.core.scanning import CountedPlace
 from flightd.core.types import CodeRead
 
-_VERSION = 7
+_VERSION = 8
 _WITH_TEXTS = 3
 """The first format with module sizes and printed text."""
 _WITH_FILLS = 4
 """The first that says how full places are."""
 _WITH_AGAIN = 6
 """The first that says which looks are second ones."""
-_READABLE = (2, 3, 4, 5, 6, _VERSION)
+_WITH_DEPTHS = 7
+"""The first that says how many pallets stand behind one another."""
+_WITH_UNDECIDED = 8
+"""The first that has codes which stayed undecided."""
+_READABLE = (2, 3, 4, 5, 6, 7, _VERSION)
 """Formats that are read as they are: what they lack is not known, and places are one pallet deep."""
 _APPLICATION = 0x666C7464
 """`fltd`: SQLite's application id, so that another program's file is told apart."""
@@ -60,6 +66,7 @@ _TAKEN_OVER = {
     4: LEAN_COLUMN,
     5: ("ALTER TABLE observation ADD COLUMN again INTEGER NOT NULL DEFAULT 0",),
     6: (*CASE_COLUMNS, "ALTER TABLE location ADD COLUMN pallets_deep INTEGER NOT NULL DEFAULT 1"),
+    7: UNDECIDED_TABLES,
 }
 """What makes a file of each earlier format one of the next."""
 _SCHEMA = """
@@ -93,7 +100,9 @@ CREATE TABLE code_read (
     module_px REAL,
     PRIMARY KEY (observation, number)
 ) STRICT, WITHOUT ROWID;
-""" + "".join(f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES, *LEAN_COLUMN, *CASE_COLUMNS))
+""" + "".join(
+    f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES, *LEAN_COLUMN, *CASE_COLUMNS, *UNDECIDED_TABLES)
+)
 
 
 class SqliteStore:
@@ -333,6 +342,7 @@ class SqliteStore:
         )
         if seen.fill is not None:
             keep_fill(self._db, seen.id, seen.fill)
+        keep_undecided(self._db, seen.id, seen.undecided)
 
     def forget(self, looks: Iterable[str]) -> None:
         """Take looks out, by their ids: somebody else keeps them."""
@@ -341,6 +351,7 @@ class SqliteStore:
             self._db.executemany("DELETE FROM code_read WHERE observation = ?", rows)
             self._db.executemany("DELETE FROM text_search WHERE observation = ?", rows)
             self._db.executemany("DELETE FROM place_fill WHERE observation = ?", rows)
+            self._db.executemany("DELETE FROM undecided_code WHERE observation = ?", rows)
             self._db.executemany("DELETE FROM observation WHERE id = ?", rows)
 
     def locations(self) -> list[LocationRecord]:
@@ -349,7 +360,7 @@ class SqliteStore:
         with self._reading():
             looks = self._observations()
             newest = {seen.location: seen for seen, standing in looks if standing == Standing.CONFIRMED}
-            deep = "pallets_deep" if self._version == _VERSION else "1"
+            deep = "pallets_deep" if self._version >= _WITH_DEPTHS else "1"
             rows = self._db.execute(f"SELECT code, node, {deep} FROM location ORDER BY code").fetchall()  # noqa: S608
         return [LocationRecord(code, node, newest.get(code), depth) for code, node, depth in rows]
 
@@ -377,6 +388,7 @@ class SqliteStore:
             reads.setdefault(seen, []).append(read)
         texts = kept_texts(self._db) if self._version >= _WITH_TEXTS else {}
         fills = kept_fills(self._db) if self._version >= _WITH_FILLS else {}
+        undecided = kept_undecided(self._db) if self._version >= _WITH_UNDECIDED else {}
         again = "again" if self._version >= _WITH_AGAIN else "0"
         rows = self._db.execute(
             f"SELECT id, run, location, utc_ns, state, confidence, evidence, {again}, "  # noqa: S608
@@ -387,7 +399,11 @@ class SqliteStore:
         return [
             (
                 _observation(
-                    row[:-1], tuple(reads.get(row[0], ())), texts.get(row[0], ()), fills.get(row[0])
+                    row[:-1],
+                    tuple(reads.get(row[0], ())),
+                    texts.get(row[0], ()),
+                    fills.get(row[0]),
+                    undecided.get(row[0], ()),
                 ),
                 row[-1],
             )
@@ -435,9 +451,10 @@ def _observation(
     reads: tuple[CodeRead, ...],
     texts: tuple[LabelValue, ...],
     fill: PlaceFill | None,
+    undecided: tuple[UndecidedCode, ...],
 ) -> Observation:
     _, run, location, utc_ns, state, confidence, evidence, again, node, *place = row
     pose = None if node is None else CountPose(node, *place)
     seen = LocationState(state)
     looked = run, location, utc_ns, seen, confidence, reads, pose, evidence, texts, fill
-    return Observation(*looked, again=bool(again))
+    return Observation(*looked, again=bool(again), undecided=undecided)

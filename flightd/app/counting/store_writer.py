@@ -151,7 +151,7 @@ class StoreWriter:
         pose = CountPose(f.node, f.x_m, f.y_m, f.height_m, f.yaw_rad)
         utc_ns = self._utc_at_zero_ns + f.stamp_ns
         looked = self._run, f.location, utc_ns, f.state, f.confidence, f.reads, pose, evidence
-        return Observation(*looked, fill=f.fill, again=f.again)
+        return Observation(*looked, fill=f.fill, again=f.again, undecided=f.undecided)
 
     def _tell(self, text: str) -> None:
         now_ns = self._clock.now_ns()

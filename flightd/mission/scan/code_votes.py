@@ -5,7 +5,7 @@ alike in each of them, and counts in none."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from flightd.mission.scan.code_assignment import PlacedRead
@@ -22,6 +22,7 @@ class CodeVotes:
     def __init__(self) -> None:
         self._codes: dict[tuple[str, str], PlacedRead] = {}
         self._frames: dict[tuple[str, str], set[int]] = {}
+        self._looks: dict[tuple[str, str], set[int]] = {}
 
     @property
     def any_read(self) -> bool:
@@ -36,6 +37,7 @@ class CodeVotes:
             known = self._codes.get(code)
             new |= known is None
             self._codes[code] = placed if known is None else _merged(known, placed)
+            self._looks.setdefault(code, set()).add(frame_seq)
             frames = self._frames.setdefault(code, set())
             if placed.read.whole or placed.read.sure:
                 frames.add(frame_seq)
@@ -53,14 +55,24 @@ class CodeVotes:
     def believed(self) -> tuple[PlacedRead, ...]:
         """One read for each code that is believed, the most often seen first; `agreeing` counts frames
         (or the looks at one frame, where those were more)."""
-        counted = (
-            replace(
-                placed, read=replace(placed.read, agreeing=max(len(self._frames[code]), placed.read.agreeing))
-            )
-            for code, placed in self._codes.items()
-        )
-        believed = (placed for placed in counted if placed.read.believed)
+        believed = (placed for placed in self._counted() if placed.read.believed)
         return tuple(sorted(believed, key=lambda placed: (-placed.read.agreeing, placed.read.text)))
+
+    def in_doubt(self) -> tuple[tuple[PlacedRead, int], ...]:
+        """One read for each code that is not believed, with how many frames gave it, whole or as what may be a
+        part; the most often seen first."""
+        doubtful = (
+            (placed, len(self._looks[placed.read.symbology, placed.read.text]))
+            for placed in self._counted()
+            if not placed.read.believed
+        )
+        return tuple(sorted(doubtful, key=lambda pair: (-pair[1], pair[0].read.text)))
+
+    def _counted(self) -> Iterator[PlacedRead]:
+        """The best read of each code, `agreeing` as in `believed`."""
+        for code, placed in self._codes.items():
+            agreeing = max(len(self._frames[code]), placed.read.agreeing)
+            yield replace(placed, read=replace(placed.read, agreeing=agreeing))
 
 
 def _merged(known: PlacedRead, newest: PlacedRead) -> PlacedRead:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from itertools import combinations
 
-from flightd.core.inventory import LocationState, PlaceFill
+from flightd.core.inventory import LocationState, PlaceFill, UndecidedCode
 from flightd.core.scanning import NO_PICTURE, BodyPose, Finding, Light, Occupancy, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
 from flightd.mission.scan.code_votes import CodeVotes
@@ -100,15 +101,17 @@ class LocationVotes:
         if place is not None and place.evidence and place.worth > self.kept:
             self.kept, self._evidence = place.worth, place.evidence
 
-    def finding(self, final: bool) -> Finding | None:
+    def finding(self, final: bool, others: Collection[str] = ()) -> Finding | None:
         """The state, None while more looks may still tell; `final` forces one, and is None only where no
-        picture showed the location."""
+        picture showed the location.  `others` are the texts that surely belong elsewhere."""
         if self._pose is None:
             return None
         believed, torn = self._believed()
         if believed and not torn:
             settled = self._enough and self._quiet >= 2 and self._agreed(believed)
-            return self._with_codes(believed, self._pose) if settled or final else None
+            if not (settled or final):
+                return None
+            return self._with_codes(believed, self._undecided(believed, others), self._pose)
         if self._is_empty(final):
             return self._found(LocationState.EMPTY, SEEN_EMPTY, self._pose)
         if not final or not self.looks:
@@ -134,7 +137,9 @@ class LocationVotes:
     def _agreed(believed: Sequence[PlacedRead]) -> bool:
         return all(placed.read.agreeing >= 2 for placed in believed)
 
-    def _with_codes(self, believed: Sequence[PlacedRead], pose: BodyPose) -> Finding:
+    def _with_codes(
+        self, believed: Sequence[PlacedRead], undecided: tuple[UndecidedCode, ...], pose: BodyPose
+    ) -> Finding:
         several = len({placed.read.text for placed in believed}) > 1
         confidence = min(
             placed.probability
@@ -142,7 +147,21 @@ class LocationVotes:
             for placed in believed
         )
         state = LocationState.SEVERAL if several else LocationState.READ
-        return self._found(state, confidence, pose, believed)
+        return replace(self._found(state, confidence, pose, believed), undecided=undecided)
+
+    def _undecided(
+        self, believed: Sequence[PlacedRead], others: Collection[str]
+    ) -> tuple[UndecidedCode, ...]:
+        """What hangs beside the codes that count and is not believed: no misread or part of one of these, nor
+        of the location's own label."""
+        own = self._location, *(placed.read.text for placed in believed)
+        return tuple(
+            UndecidedCode(doubtful.read.symbology, doubtful.read.text, looks)
+            for doubtful, looks in self._votes.in_doubt()
+            if doubtful.read.text not in others
+            and not any(doubtful.read.text in text for text in own)
+            and not any(_lies_on(doubtful, label) for label in believed)
+        )
 
     def fill(self, state: LocationState) -> PlaceFill | None:
         """How full the place is by all looks, if it is in this state."""
@@ -183,6 +202,13 @@ class LocationVotes:
         single one: half of an EAN-13 that the picture's edge cuts off is a UPC-E by its bars."""
         once = not one.read.sure and self._votes.frames(one) == 1
         return once and one.read.text != other.read.text and _is_one_label(one, other)
+
+
+def _lies_on(doubtful: PlacedRead, label: PlacedRead) -> bool:
+    """Whether the middle of what was not believed is on a label: a part of a code is smaller, and aside of the
+    code's own middle."""
+    reach = label.size_m / 2
+    return abs(doubtful.x_m - label.x_m) < reach and abs(doubtful.height_m - label.height_m) < reach
 
 
 def _is_one_label(one: PlacedRead, other: PlacedRead) -> bool:

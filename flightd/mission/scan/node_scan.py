@@ -39,6 +39,8 @@ class ScanTask:
         self._open: dict[str, LocationVotes] = {
             code: LocationVotes(code, node, params.pictures) for view in views for code in view.locations
         }
+        self._owners: dict[str, set[str]] = {}
+        """Where each text was read that is believed."""
         self._usual = [view.exposure for view in views]
         self._begun_ns: int | None = None
         self._relit = False
@@ -86,6 +88,8 @@ class ScanTask:
         reads: dict[str, list[PlacedRead]] = {}
         for placed in look.reads:
             reads.setdefault(placed.location, []).append(placed)
+            if placed.location and placed.read.believed:
+                self._owners.setdefault(placed.read.text, set()).add(placed.location)
         doubtful = {placed.likeliest for placed in look.reads if not placed.location}
         for code in self._left(view):
             place, own = places.get(code), reads.get(code, [])
@@ -166,7 +170,8 @@ class ScanTask:
         return tuple(code for code in view.locations if code in self._open)
 
     def _settle(self, code: str, final: bool) -> None:
-        finding = self._open[code].finding(final)
+        others = {text for text, places in self._owners.items() if places - {code}}
+        finding = self._open[code].finding(final, others)
         if finding is not None:
             del self._open[code]
             self._findings.append(finding)

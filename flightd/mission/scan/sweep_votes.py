@@ -110,7 +110,7 @@ class SweepVotes:
     def verdict(self, others: Collection[str] = ()) -> Finding | Undecided:
         """What the views say together, asked when the place is out of the picture; `others` are the codes
         that surely belong elsewhere."""
-        found = self._votes.finding(final=False) or self._votes.finding(final=True)
+        found = self._votes.finding(False, others) or self._votes.finding(True, others)
         if found is None or self._votes.looks < self._params.pictures:
             return Undecided.UNSEEN
         if found.state in _CODES:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -59,6 +61,32 @@ def verdict(
 
 def state(found: Finding | Undecided) -> LocationState | Undecided:
     return found.state if isinstance(found, Finding) else found
+
+
+Told: TypeAlias = Callable[..., tuple[str, list[str], list[tuple[str, int]]]]
+
+
+def stopped(
+    views: Sequence[Sequence[PlacedRead]], others: Sequence[str] = ()
+) -> tuple[str, list[str], list[tuple[str, int]]]:
+    """What a stop before the place tells: its state, its codes, and what stayed undecided."""
+    votes = LocationVotes(CODE, "A2", PARAMS.pictures)
+    for seq, reads in enumerate(views):
+        votes.add(seq, pose(seq), PlaceLook(CODE, QUAD, 1.0, GOODS, code=bool(reads)), reads)
+    return told_by(votes.finding(True, others))
+
+
+def passed(
+    views: Sequence[Sequence[PlacedRead]], others: Sequence[str] = ()
+) -> tuple[str, list[str], list[tuple[str, int]]]:
+    """The same of a flight past it."""
+    return told_by(verdict(views, others=others))
+
+
+def told_by(found: Finding | Undecided | None) -> tuple[str, list[str], list[tuple[str, int]]]:
+    assert isinstance(found, Finding)
+    codes = sorted(read.text for read in found.reads)
+    return found.state.value, codes, [(code.text, code.looks) for code in found.undecided]
 
 
 UNSURE_READ = read("109481000094", sure=False)
@@ -124,6 +152,36 @@ def test_half_a_code_at_the_pictures_edge_does_not_make_another_of_its_label() -
     beside = [replace(half[0], x_m=1.2)]
     assert state(verdict([whole, whole, whole, beside])) is Undecided.APART
     assert verdict([whole, whole, whole, [placed("P2")]]) is Undecided.TORN, "vouched for, too"
+
+
+@pytest.mark.parametrize("told", [stopped, passed])
+def test_a_second_label_that_stays_in_doubt_is_told_beside_the_code(told: Told) -> None:
+    label, second = placed("4094819312344"), placed("070429", 1.3, sure=False)
+    part = replace(second, read=replace(UNSURE_READ, agreeing=3, whole=False))
+    assert told([[label]] * 4) == ("read", ["4094819312344"], [])
+    assert told([[label], [label, second], [label], [label]]) == (
+        "read", ["4094819312344"], [("070429", 1)],
+    )  # fmt: skip
+    other = placed("070428", 1.3, sure=False)
+    torn = [[label, second], [label, other, part], [label, part], [label]]
+    assert told(torn) == (
+        "read", ["4094819312344"], [("109481000094", 2), ("070428", 1), ("070429", 1)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("told", [stopped, passed])
+def test_no_misread_of_a_label_that_was_read_nor_the_places_own_or_a_neighbours_is_told(told: Told) -> None:
+    label = placed("4094819312344")
+
+    def with_once(*doubtful: PlacedRead, others: Sequence[str] = ()) -> list[tuple[str, int]]:
+        return told([[label], [label, *doubtful], [label], [label]], others)[2]
+
+    misread = placed("109481000094", 1.02, sure=False)
+    assert with_once(misread) == []
+    assert with_once(replace(misread, height_m=1.1)) == [("109481000094", 1)]
+    assert with_once(placed("948193", 1.3, sure=False)) == [], "a part of the code, on its second copy"
+    assert with_once(placed("02-1-1", 1.3, sure=False)) == [], "a part of the location's label"
+    assert with_once(placed("070429", 1.3, sure=False), others=["070429"]) == []
 
 
 def test_what_may_be_a_part_of_a_longer_code_is_left_for_a_stop_and_is_unreadable_there() -> None:

@@ -19,7 +19,15 @@ from hypothesis import strategies as st
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import CaseGrid, LocationState, Observation, PlaceFill, PlannedLocation, Standing
+from flightd.core.inventory import (
+    CaseGrid,
+    LocationState,
+    Observation,
+    PlaceFill,
+    PlannedLocation,
+    Standing,
+    UndecidedCode,
+)
 from flightd.core.types import CodeRead
 from flightd.ports import Store
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
@@ -86,6 +94,24 @@ def test_how_full_a_place_is_is_read_back_as_it_was_and_merged(
         for store in (one, other):
             assert store.history(seen.location) == [seen]
             assert store.locations()[0].observation == seen
+        one.forget([seen.id])
+        assert one.history(seen.location) == []
+
+
+UNDECIDED = UndecidedCode("ITF", "070429", 1), UndecidedCode("Codabar", "A1234B", 3)
+
+
+def test_what_stayed_undecided_is_read_back_merged_and_makes_no_other_look(tmp_path: Path) -> None:
+    seen = replace(look(2), undecided=UNDECIDED)
+    assert seen.id == look(2).id
+    with SqliteStore(tmp_path / "a") as one, SqliteStore(tmp_path / "b") as other:
+        one.commit(seen)
+        other.merge(one)
+        other.commit(look(2))
+        for store in (one, other):
+            assert store.history(seen.location) == [seen]
+            assert [record.texts for record in store.locations()] == [("PALLET-000002",)]
+            assert [read.text for read in store.counted(seen.run)[0].reads] == ["PALLET-000002"]
         one.forget([seen.id])
         assert one.history(seen.location) == []
 
@@ -301,14 +327,16 @@ def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path:
         assert [kept.id for kept in other.history(seen.location)] == [seen.id]
 
 
+TO_7 = ("DROP TABLE undecided_code",)
 TO_6 = (
+    *TO_7,
     "ALTER TABLE place_fill DROP COLUMN case_columns",
     "ALTER TABLE place_fill DROP COLUMN case_rows",
     "ALTER TABLE location DROP COLUMN pallets_deep",
 )
 TO_5 = (*TO_6, "ALTER TABLE observation DROP COLUMN again")
 TO_4 = (*TO_5, "ALTER TABLE place_fill DROP COLUMN lean_m")
-TO_3 = (*TO_5[2:], "DROP TABLE place_fill")
+TO_3 = (*TO_7, *TO_5[3:], "DROP TABLE place_fill")
 TO_2 = (*TO_3, "ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
 OLDER = {
     1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"),
@@ -317,6 +345,7 @@ OLDER = {
     4: TO_4,
     5: TO_5,
     6: TO_6,
+    7: TO_7,
 }
 
 
@@ -329,10 +358,13 @@ def test_an_inventory_of_an_earlier_format_is_taken_over_as_confirmed(tmp_path: 
         database.execute(statement)
     database.execute(f"PRAGMA user_version = {version}")
     database.close()
+    unsure = replace(look(2), undecided=UNDECIDED)
     with SqliteStore(tmp_path) as store:
         assert newest(store, look(1).location) == look(1).id
-        store.commit(look(2), confirmed=False)
+        assert [seen.undecided for seen in store.history(look(1).location)] == [()]
+        store.commit(unsure, confirmed=False)
         assert newest(store, look(2).location) is None
+        assert store.history(look(2).location) == [unsure]
 
 
 def newest(store: SqliteStore, location: str) -> str | None:
