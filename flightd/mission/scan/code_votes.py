@@ -7,8 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import TypeAlias
 
 from flightd.mission.scan.code_assignment import PlacedRead
+
+SeenRead: TypeAlias = tuple[PlacedRead, int]
+"""A code, and how many frames gave it, whole or as what may be a part."""
 
 
 class CodeVotes:
@@ -58,15 +62,15 @@ class CodeVotes:
         believed = (placed for placed in self._counted() if placed.read.believed)
         return tuple(sorted(believed, key=lambda placed: (-placed.read.agreeing, placed.read.text)))
 
-    def in_doubt(self) -> tuple[tuple[PlacedRead, int], ...]:
-        """One read for each code that is not believed, with how many frames gave it, whole or as what may be a
-        part; the most often seen first."""
-        doubtful = (
-            (placed, len(self._looks[placed.read.symbology, placed.read.text]))
-            for placed in self._counted()
-            if not placed.read.believed
+    def seen(self) -> tuple[SeenRead, ...]:
+        """One read for each code, believed or not."""
+        return tuple(
+            (placed, len(self._looks[placed.read.symbology, placed.read.text])) for placed in self._counted()
         )
-        return tuple(sorted(doubtful, key=lambda pair: (-pair[1], pair[0].read.text)))
+
+    def in_doubt(self) -> tuple[SeenRead, ...]:
+        """One read for each code that is not believed."""
+        return tuple(seen for seen in self.seen() if not seen[0].read.believed)
 
     def _counted(self) -> Iterator[PlacedRead]:
         """The best read of each code, `agreeing` as in `believed`."""

@@ -10,7 +10,7 @@ from itertools import combinations
 from flightd.core.inventory import LocationState, PlaceFill, UndecidedCode
 from flightd.core.scanning import NO_PICTURE, BodyPose, Finding, Light, Occupancy, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
-from flightd.mission.scan.code_votes import CodeVotes
+from flightd.mission.scan.code_votes import CodeVotes, SeenRead
 from flightd.mission.scan.fill_votes import FillVotes
 
 _LEAST_SHARE = 0.6
@@ -31,12 +31,14 @@ _NO_CODE = 0.9
 
 class LocationVotes:
     """The looks at one location from a node.  `finding` gives its state as soon as `pictures` looks agree on
-    it; `light` is how it came out in the last."""
+    it; `light` is how it came out in the last.  `passed` is what was read here in passing, which decides
+    nothing."""
 
-    def __init__(self, location: str, node: str, pictures: int) -> None:
+    def __init__(self, location: str, node: str, pictures: int, passed: Sequence[SeenRead] = ()) -> None:
         self._location = location
         self._node = node
         self._least = pictures
+        self._passed = passed
         self._votes = CodeVotes()
         self._fills = FillVotes()
         self._seen: Counter[Occupancy] = Counter()
@@ -63,6 +65,11 @@ class LocationVotes:
     def any_read(self) -> bool:
         """Whether any code was read here, believed or not."""
         return self._votes.any_read
+
+    @property
+    def reads(self) -> tuple[SeenRead, ...]:
+        """What was read here, believed or not."""
+        return self._votes.seen()
 
     @property
     def only_parts(self) -> bool:
@@ -152,16 +159,16 @@ class LocationVotes:
     def _undecided(
         self, believed: Sequence[PlacedRead], others: Collection[str]
     ) -> tuple[UndecidedCode, ...]:
-        """What hangs beside the codes that count and is not believed: no misread or part of one of these, nor
-        of the location's own label."""
+        """What was read beside the codes that count and is not believed, the most often seen first: no misread
+        or part of one of these, nor of the location's own label."""
         own = self._location, *(placed.read.text for placed in believed)
-        return tuple(
-            UndecidedCode(doubtful.read.symbology, doubtful.read.text, looks)
-            for doubtful, looks in self._votes.in_doubt()
-            if doubtful.read.text not in others
-            and not any(doubtful.read.text in text for text in own)
-            and not any(_lies_on(doubtful, label) for label in believed)
-        )
+        looks: Counter[tuple[str, str]] = Counter()
+        for doubtful, times in (*self._votes.in_doubt(), *self._passed):
+            text = doubtful.read.text
+            known = text in others or any(text in whole for whole in own)
+            if not known and not any(_lies_on(doubtful, label) for label in believed):
+                looks[doubtful.read.symbology, text] += times
+        return tuple(UndecidedCode(*code, times) for code, times in looks.most_common())
 
     def fill(self, state: LocationState) -> PlaceFill | None:
         """How full the place is by all looks, if it is in this state."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 from flightd.config.scan import ScanConfig
 from flightd.core.scanning import Finding, Light, Occupancy, PictureWorth
 from flightd.mission.scan.code_assignment import PlacedRead, ShelfLook
+from flightd.mission.scan.code_votes import SeenRead
 from flightd.mission.scan.location_votes import LocationVotes
 from flightd.mission.scan.views import View, ViewPlanner
 
@@ -30,14 +32,18 @@ class ScanTask:
         planner: ViewPlanner,
         params: ScanConfig,
         relights: bool = True,
+        passed: Mapping[str, Sequence[SeenRead]] = MappingProxyType({}),
     ) -> None:
+        """`passed` is what was read at locations in passing."""
         self.node = node
         self.relights = relights
         self._views = list(views)
         self._planner = planner
         self._params = params
         self._open: dict[str, LocationVotes] = {
-            code: LocationVotes(code, node, params.pictures) for view in views for code in view.locations
+            code: LocationVotes(code, node, params.pictures, passed.get(code, ()))
+            for view in views
+            for code in view.locations
         }
         self._owners: dict[str, set[str]] = {}
         """Where each text was read that is believed."""

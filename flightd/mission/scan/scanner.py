@@ -21,6 +21,7 @@ from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, ShelfLook, Sighting
 from flightd.mission.scan.code_owners import CodeOwners
+from flightd.mission.scan.code_votes import SeenRead
 from flightd.mission.scan.face_light import USUAL, Face, FaceLight, LegLight
 from flightd.mission.scan.label_checks import LabelChecks
 from flightd.mission.scan.node_scan import ScanTask
@@ -65,6 +66,7 @@ class Scanner:
         self._light = FaceLight(params.expert.darker, params.expert.brighter, params.sweep.most_gain)
         self._shot = USUAL
         self._swept: set[str] = set()
+        self._passed: dict[str, tuple[SeenRead, ...]] = {}
         self._owners = CodeOwners()
         self._aisle_of = {node.id: node.aisle for node in site.nodes.values()}
         self._planned = self._wanted = frozenset(site.locations)
@@ -164,6 +166,7 @@ class Scanner:
         self.leave()
         self._done.clear()
         self._swept.clear()
+        self._passed.clear()
         self._owners = CodeOwners()
         self._pending.begin()
         self._begun = self._begun_blind = 0
@@ -172,7 +175,7 @@ class Scanner:
         """Begin or continue the scan of a node that is reached."""
         self.leave()
         views = [self._lit(view) for view in self._planner.views(node, self._left(node), height_m, yaw_rad)]
-        self._task = ScanTask(node, views, self._planner, self._params, self._relights)
+        self._task = ScanTask(node, views, self._planner, self._params, self._relights, self._passed)
         self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
         self._pending.arrive(node)
 
@@ -247,6 +250,7 @@ class Scanner:
         if self._sweep is not None:
             self._sweep.forget()
             self._gather_sweep()
+        self._passed.clear()
 
     def trust(self) -> None:
         """The place is known again; labels that still contradict it hang wrong."""
@@ -477,6 +481,7 @@ class Scanner:
             again = self._count(found)
             self._sweep.undecided.update(dict.fromkeys(again, Undecided.ELSEWHERE))
         self._swept.update(self._sweep.undecided)
+        self._passed |= self._sweep.passed
 
     def _count(self, found: Finding) -> frozenset[str]:
         """A finding, whichever way it came.  The places that it takes back, maybe its own: they are counted

@@ -12,6 +12,7 @@ from flightd.core.geometry import wrap_pi
 from flightd.core.scanning import NO_PICTURE, BodyPose, Finding, PictureWorth
 from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.code_assignment import PlacedRead, ShelfLook
+from flightd.mission.scan.code_votes import SeenRead
 from flightd.mission.scan.sweep_votes import SweepVotes, Undecided
 from flightd.site.shelf_cells import Cell
 
@@ -56,6 +57,8 @@ class SweepTask:
         """From when on each leg was flown, in the order in which they were."""
         self.undecided: dict[str, Undecided] = {}
         """Places that were flown past and not decided, and why."""
+        self.passed: dict[str, tuple[SeenRead, ...]] = {}
+        """What was read at these, but for what surely belongs elsewhere."""
 
     @property
     def looking(self) -> bool:
@@ -82,6 +85,7 @@ class SweepTask:
             self.undecided[code] = Undecided.DOUBTED
             self._closed.add(code)
         self._votes.clear()
+        self.passed.clear()
         self.pause()
 
     def leg_at(self, pose: BodyPose) -> SweepLeg | None:
@@ -183,11 +187,15 @@ class SweepTask:
             if leave is not None and verdict is leave:
                 continue
             self._closed.add(code)
-            self._votes.pop(code, None)
+            votes = self._votes.pop(code, None)
             if isinstance(verdict, Finding):
                 self._findings.append(verdict)
-            else:
-                self.undecided[code] = verdict
+                continue
+            self.undecided[code] = verdict
+            if votes is not None and verdict is not Undecided.ELSEWHERE:
+                self.passed[code] = tuple(
+                    seen for seen in votes.reads if not self._owners.get(seen[0].read.text, set()) - {code}
+                )
 
     def _verdict(self, code: str) -> Finding | Undecided:
         votes = self._votes.get(code)

@@ -16,6 +16,7 @@ from flightd.config.scan import ScanConfig
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PictureWorth, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
+from flightd.mission.scan.code_votes import SeenRead
 from flightd.mission.scan.location_votes import SEEN_EMPTY, LocationVotes
 
 _SEEN_SHARE = 0.6
@@ -106,6 +107,11 @@ class SweepVotes:
         picture of this leg can show more."""
         kept = self._votes.kept
         return kept if kept.share >= 1.0 else replace(kept, share=kept.share * self._full_share)
+
+    @property
+    def reads(self) -> tuple[SeenRead, ...]:
+        """What was read there, believed or not."""
+        return self._votes.reads
 
     def verdict(self, others: Collection[str] = ()) -> Finding | Undecided:
         """What the views say together, asked when the place is out of the picture; `others` are the codes

@@ -9,8 +9,9 @@ from dataclasses import replace
 import pytest
 
 from flightd.app.flight_orders import nodes_to_count
-from flightd.core.inventory import LocationState
+from flightd.core.inventory import LocationState, UndecidedCode
 from flightd.core.scanning import CountedPlace, Light, Occupancy
+from flightd.core.types import CodeRead
 from flightd.mission.scan.scanner import Scanner
 from flightd.mission.scan.views import View
 from flightd.site.racks import code_form
@@ -74,6 +75,25 @@ def test_one_read_without_a_checksum_is_never_believed() -> None:
     hover.scanner.take(picture(1, (guess,), {code: Occupancy.GOODS}, hover.now_ns + 1), here)
     hover.run(GOODS, {})
     assert hover.found[code].state is LocationState.UNREADABLE
+
+
+def test_what_one_look_gives_beside_a_code_is_told_unless_it_is_a_neighbours() -> None:
+    hover = Hover()
+    one, two, three = LOCATIONS[:3]
+    hover.at_view()
+    here = pose(hover.now_ns + 1)
+
+    def guess(code: str, text: str) -> CodeRead:
+        return replace(hover.code(here, code, text), sure=False)
+
+    reads = guess(one, "GUESS 2"), guess(three, "P2"), hover.code(here, two, "P2")
+    shown = dict.fromkeys((one, two, three), Occupancy.GOODS)
+    hover.scanner.take(picture(1, reads, shown, hover.now_ns + 1), here)
+    hover.run(GOODS, {code: (f"{code} P",) for code in LOCATIONS if code != two} | {two: ("P2",)})
+    states = {finding.state for finding in hover.found.values()}
+    assert states == {LocationState.READ}
+    told = {code: found.undecided for code, found in hover.found.items() if found.undecided}
+    assert told == {one: (UndecidedCode("QR Code", "GUESS 2", 1),)}
 
 
 def test_two_texts_of_one_label_cancel_each_other() -> None:

@@ -23,6 +23,7 @@ from flightd.core.scanning import (
     PlaceLook,
 )
 from flightd.mission.scan.code_assignment import Assigner, PlacedRead, ShelfLook
+from flightd.mission.scan.code_votes import SeenRead
 from flightd.mission.scan.location_votes import LocationVotes
 from flightd.mission.scan.sweep_planner import SweepPlanner
 from flightd.mission.scan.sweep_task import SweepTask
@@ -67,10 +68,10 @@ Told: TypeAlias = Callable[..., tuple[str, list[str], list[tuple[str, int]]]]
 
 
 def stopped(
-    views: Sequence[Sequence[PlacedRead]], others: Sequence[str] = ()
+    views: Sequence[Sequence[PlacedRead]], others: Sequence[str] = (), passed: Sequence[SeenRead] = ()
 ) -> tuple[str, list[str], list[tuple[str, int]]]:
     """What a stop before the place tells: its state, its codes, and what stayed undecided."""
-    votes = LocationVotes(CODE, "A2", PARAMS.pictures)
+    votes = LocationVotes(CODE, "A2", PARAMS.pictures, passed)
     for seq, reads in enumerate(views):
         votes.add(seq, pose(seq), PlaceLook(CODE, QUAD, 1.0, GOODS, code=bool(reads)), reads)
     return told_by(votes.finding(True, others))
@@ -165,8 +166,25 @@ def test_a_second_label_that_stays_in_doubt_is_told_beside_the_code(told: Told) 
     other = placed("070428", 1.3, sure=False)
     torn = [[label, second], [label, other, part], [label, part], [label]]
     assert told(torn) == (
-        "read", ["4094819312344"], [("109481000094", 2), ("070428", 1), ("070429", 1)],
+        "read", ["4094819312344"], [("109481000094", 2), ("070429", 1), ("070428", 1)],
     )  # fmt: skip
+
+
+def test_a_second_label_that_one_view_gives_in_passing_is_told_where_the_stop_does_not_see_it() -> None:
+    label, second = placed("P1"), placed("P2", 1.3)
+    views = [[label, second], [label], [label], [label]]
+    assert verdict(views) is Undecided.ONCE
+    votes = SweepVotes(CODE, "A2", PARAMS, 1.0)
+    for seq, reads in enumerate(views):
+        votes.add(seq, pose(seq), PlaceLook(CODE, QUAD, 1.0, GOODS), reads, bearing_rad=0.0)
+
+    def then(*reads: PlacedRead) -> tuple[str, list[str], list[tuple[str, int]]]:
+        return stopped([reads] * 4, passed=votes.reads)
+
+    assert then(label) == ("read", ["P1"], [("P2", 1)])
+    assert then(label, second) == ("several", ["P1", "P2"], [])
+    assert then(second) == ("read", ["P2"], [("P1", 4)])
+    assert then(placed("P3")) == ("read", ["P3"], [("P2", 1)]), "one label, read otherwise in passing"
 
 
 @pytest.mark.parametrize("told", [stopped, passed])
@@ -348,6 +366,21 @@ def test_a_place_that_was_only_glimpsed_may_still_be_flown_past() -> None:
     assert flight.found() == {}
     flight.task.end()
     assert flight.task.undecided[TWO] is Undecided.UNSEEN
+
+
+def test_what_is_left_for_a_stop_keeps_what_was_read_in_passing() -> None:
+    passing = Passing()
+    passing.see({ONE: ["P1", "P2"], TWO: ["P3", "P2"]})
+    for _ in range(3):
+        passing.see({ONE: ["P1"], TWO: ["P4"]})
+    passing.task.end()
+    assert passing.task.undecided == {ONE: Undecided.TORN, TWO: Undecided.TORN}
+    reads = {
+        code: [(seen.read.text, looks) for seen, looks in at] for code, at in passing.task.passed.items()
+    }
+    assert reads == {ONE: [("P1", 4)], TWO: [("P3", 1), ("P4", 3)]}, "P2 is at both"
+    passing.task.forget()
+    assert passing.task.passed == {}
 
 
 def test_one_code_at_two_neighbours_is_decided_at_neither() -> None:
