@@ -6,6 +6,7 @@ import base64
 import json
 import re
 from collections import Counter
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.cli.main import app
 from flightd.core.errors import InputError
 from flightd.core.flight_order import FlightOrder
-from flightd.core.inventory import LocationRecord, LocationState, Observation
+from flightd.core.inventory import LocationRecord, LocationState, Observation, UndecidedCode
 from flightd.core.topics import Document, Topic
 from flightd.core.types import CodeRead
 from flightd.inventory.comparison import ComparisonOutcome
@@ -306,6 +307,26 @@ def test_pictures_have_a_budget_and_those_of_exceptions_come_first() -> None:
     assert next(iter(pictures)) == "f" * 64
     assert 10 < len(pictures) < 150
     assert len(page) < 20_000_000
+
+
+def test_a_place_with_something_undecided_needs_a_person_and_keeps_its_state() -> None:
+    seen = CodeRead("QR Code", "BOX-1", (), True, 2, 1.0)
+    undecided = UndecidedCode("ITF", "<07>", 1), UndecidedCode("ITF", "12", 2)
+    looks = [Observation("r", code, 1, LocationState.READ, 0.9, (seen,)) for code in ("plain", "odd")]
+    looks[1] = replace(looks[1], undecided=undecided)
+    count = CountedStock([LocationRecord(look.location, "", look) for look in looks], lambda _name: None)
+    page = inventory_section(count, None)
+    listed = re.search(r'class="exceptions".*?</table>', page, re.DOTALL)
+    assert listed is not None
+    assert re.findall(r'data-code="([^"]+)"', listed[0]) == ["odd"]
+    assert "undecided: &lt;07&gt; (1 look), 12 (2 looks)" in listed[0]
+    assert [title for code, _, title in Cells(page).places if "undecided" in title] == [
+        "odd · read · BOX-1 · undecided: <07> (1 look), 12 (2 looks) · 90 %"
+    ]
+    places = data_of(page, "counted")["places"]
+    assert isinstance(places, dict)
+    assert ["Undecided", "<07> (1 look), 12 (2 looks)"] in places["odd"]["facts"]
+    assert (places["odd"]["odd"], places["plain"]["odd"], places["odd"]["texts"]) == (True, False, ["BOX-1"])
 
 
 @pytest.mark.parametrize("picture", [None, b"no picture"])

@@ -8,6 +8,7 @@ import os
 import shutil
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import msgspec
 import pytest
 
 from flightd.adapters.ground_link.client import Address
-from flightd.core.inventory import LocationState, PlaceFill, Standing
+from flightd.core.inventory import LocationState, PlaceFill, Standing, UndecidedCode
 from flightd.ground.access import access
 from flightd.ground.access.key_book import KeyBook, Scope
 from flightd.ground.access.passwords import hashed_secret, new_key
@@ -208,14 +209,21 @@ async def test_a_drone_delivers_over_http_once(hall: Path, tmp_path: Path) -> No
 async def test_a_drone_that_does_not_tell_how_full_places_are_delivers_as_before(
     hall: Path, tmp_path: Path
 ) -> None:
-    fill = PlaceFill(0.5, 0.04)
+    fill, undecided = PlaceFill(0.5, 0.04), (UndecidedCode("ITF", "070429", 2),)
     seen = [look(place, LocationState.READ, code("PAL-1"), fill=fill) for place in ("B-1", "B-2")]
+    seen = [replace(one, undecided=undecided) for one in seen]
     sent = Batch(SITE, "north", looks=tuple(SentLook(one, Standing.CONFIRMED) for one in seen))
     older = msgspec.to_builtins(sent)
     del older["looks"][0]["observation"]["fill"]
+    del older["looks"][0]["observation"]["undecided"]
     async with asked(hall, tmp_path / "state", Scope.DELIVER, Scope.STOCK) as program:
         assert (await program.post("/deliveries", older))[1]["new"] == 2
-        fills = {row["location"]: row["fill"] for row in (await program.page(f"/stock?{_QUERY}"))["rows"]}
+        stock = (await program.page(f"/stock?{_QUERY}"))["rows"]
+        assert {row["location"]: [code["text"] for code in row["undecided"]] for row in stock} == {
+            "B-1": [],
+            "B-2": ["070429"],
+        }
+        fills = {row["location"]: row["fill"] for row in stock}
         assert (fills["B-1"], fills["B-2"]) == (
             None,
             {"share": 0.5, "overhang_m": 0.04, "lean_m": None, "cases": None},

@@ -13,12 +13,18 @@ from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.core.csv_text import inert
 from flightd.core.inventory import LocationRecord
 from flightd.core.utc_time import utc_text
-from flightd.inventory.export.rows import DEPTH_COLUMNS, FILL_COLUMNS, fill_cells
+from flightd.inventory.export.rows import (
+    DEPTH_COLUMNS,
+    FILL_COLUMNS,
+    UNDECIDED_COLUMNS,
+    fill_cells,
+    undecided_cells,
+)
 from flightd.sim.racks.stock_truth import score_stock
 
 _COLUMNS = (
     "location", "node", "state", "texts", "symbology", "confidence", "utc", "x_m", "y_m", "height_m", "run",
-    "evidence", *FILL_COLUMNS, *DEPTH_COLUMNS,
+    "evidence", *FILL_COLUMNS, *DEPTH_COLUMNS, *UNDECIDED_COLUMNS,
 )  # fmt: skip
 
 
@@ -61,10 +67,11 @@ def _records(folder: Path) -> list[LocationRecord] | None:
 
 
 def _row(record: LocationRecord) -> list[str | float]:
-    seen, depth = record.observation, (record.pallets_deep, record.pallets_seen)
+    seen = record.observation
+    last = record.pallets_deep, record.pallets_seen, *undecided_cells(seen)
     if seen is None:
-        empty = [""] * (len(_COLUMNS) - 3 - len(depth))
-        return [record.code, record.node, record.state.value, *empty, *depth]
+        empty = [""] * (len(_COLUMNS) - 3 - len(last))
+        return [record.code, record.node, record.state.value, *empty, *last]
     pose = seen.pose
     symbologies = dict.fromkeys(read.symbology for read in seen.reads)
     where = (pose.x_m, pose.y_m, pose.height_m) if pose else ("", "", "")
@@ -80,5 +87,5 @@ def _row(record: LocationRecord) -> list[str | float]:
         seen.run,
         seen.evidence,
         *fill_cells(seen),
-        *depth,
+        *last,
     ]

@@ -31,11 +31,14 @@ def print_records(records: Sequence[LocationRecord], least_confidence: float = L
 
 
 def _known(record: LocationRecord, least_confidence: float) -> Iterator[str]:
-    """Lot, expiry, how full the place is, and the cases in its front, as far as they are known."""
+    """What stayed undecided, lot, expiry, how full the place is, and the cases in its front, as far as they
+    are known."""
     from flightd.core.inventory import LocationState
     from flightd.inventory.place_values import place_values
 
     seen = record.observation
+    for code in seen.undecided if seen else ():
+        yield f"undecided {visible(code.text)} ({code.looks} {'look' if code.looks == 1 else 'looks'})"
     for stands in place_values(seen, least_confidence):
         if stands.kind in _SHOWN and stands.known is not None:
             yield f"{stands.kind} {visible(stands.known.text)}"

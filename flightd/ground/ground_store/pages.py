@@ -14,7 +14,7 @@ from flightd.ground.ground_store.fill_text import fill_shown
 MOST_ROWS = 1000
 _STOCK = (
     "SELECT place.code, node, state, texts, place.utc_ns, run.name, confidence, evidence, pallets_deep,"
-    " fill FROM place LEFT JOIN run ON run.id = place.run"
+    " undecided, fill FROM place LEFT JOIN run ON run.id = place.run"
 )
 _DIFFERENCES = (
     "SELECT code, kind, utc_ns, state, texts, run.name, before_ns, before_state, before_texts"
@@ -23,8 +23,8 @@ _DIFFERENCES = (
 _LOOKS = (
     "SELECT observation.utc_ns, observation.id, place.code, run.name, observation.state,"
     " observation.confidence, standing, observation.node, x_m, y_m, height_m, yaw_rad, observation.evidence,"
-    " reads, observation.fill FROM observation JOIN place ON place.id = observation.place"
-    " JOIN run ON run.id = observation.run"
+    " reads, observation.fill, observation.undecided FROM observation"
+    " JOIN place ON place.id = observation.place JOIN run ON run.id = observation.run"
 )
 
 
@@ -86,7 +86,8 @@ def stock(
         f"{_STOCK} WHERE place.site = ?{where} AND place.code > ? ORDER BY place.code LIMIT ?",
         site, *values, after, limit,
     )  # fmt: skip
-    names = ("location", "node", "state", "texts", "utc_ns", "run", "confidence", "evidence", "pallets_deep")
+    names = ("location", "node", "state", "texts", "utc_ns", "run", "confidence", "evidence", "pallets_deep",
+             "undecided")  # fmt: skip
     return [{**_document(names, row[:-1]), "fill": fill_shown(row[-1])} for row in rows]
 
 
@@ -171,14 +172,14 @@ def _only(found: list[Row], otherwise: str) -> int:
 def _document(names: tuple[str, ...], row: Row) -> dict[str, Any]:
     document = {}
     for name, value in zip(names, row, strict=True):
-        shown = json.loads(value) if name.endswith("texts") else value
+        shown = json.loads(value) if name.endswith(("texts", "undecided")) else value
         document[name] = value.hex() if isinstance(value, bytes) else shown
     return document
 
 
 def _look(row: Row) -> dict[str, Any]:
     utc_ns, identity, code, run, state, confidence, standing, node, x_m, y_m, height_m, yaw_rad, *rest = row
-    evidence, reads, fill = rest
+    evidence, reads, fill, undecided = rest
     return {
         "id": identity.hex(),
         "utc_ns": utc_ns,
@@ -196,4 +197,5 @@ def _look(row: Row) -> dict[str, Any]:
             {"symbology": s, "text": text, "checksum": bool(sure), "agreeing": n, "quality": q, "gs1": gs1}
             for s, text, sure, n, q, gs1 in json.loads(reads)
         ],
+        "undecided": json.loads(undecided),
     }

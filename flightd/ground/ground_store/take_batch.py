@@ -11,9 +11,9 @@ from flightd.ground.ground_store.derived import Moment, Touched, renew
 from flightd.ground.ground_store.engine import Engine, Session, listed
 from flightd.ground.ground_store.events import EventKind, Noted
 from flightd.ground.ground_store.fill_text import fill_text
-from flightd.ground.ground_store.reads_text import reads_text
+from flightd.ground.ground_store.reads_text import reads_text, undecided_text
 
-_LOOK = f"INSERT INTO observation VALUES ({', '.join('?' * 15)}) ON CONFLICT DO NOTHING"
+_LOOK = f"INSERT INTO observation VALUES ({', '.join('?' * 16)}) ON CONFLICT DO NOTHING"
 _TOLD = ("duration_s", "mission", "outcome", "reason", "verdict", "nodes_planned", "nodes_visited")
 """Of a flight, when its log ended or was judged since."""
 _FLIGHT = (
@@ -202,7 +202,7 @@ def _row(look: SentLook, places: dict[str, int], runs: dict[str, int]) -> tuple[
     return (
         bytes.fromhex(seen.id), seen.utc_ns, places[seen.location], runs[seen.run], seen.state.value,
         float(seen.confidence), int(look.standing), *where, bytes.fromhex(seen.evidence) or None,
-        reads_text(seen.reads), fill_text(seen.fill),
+        reads_text(seen.reads), fill_text(seen.fill), undecided_text(seen.undecided),
     )  # fmt: skip
 
 
@@ -218,7 +218,7 @@ def _touched(looks: Sequence[SentLook], places: dict[str, int], runs: dict[str, 
                 Moment(
                     seen.utc_ns, bytes.fromhex(seen.id), runs[seen.run], seen.state.value,
                     reads_text(seen.reads), seen.confidence, bytes.fromhex(seen.evidence) or None,
-                    fill_text(seen.fill),
+                    fill_text(seen.fill), undecided_text(seen.undecided),
                 ),
                 counts=look.standing is Standing.CONFIRMED,
             )  # fmt: skip

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from flightd.core.inventory import LocationRecord, Observation, PlaceFill
+from flightd.core.inventory import LocationRecord, Observation, PlaceFill, UndecidedCode
 from flightd.core.label_values import LEAST_CONFIDENCE, PlaceValue, told_number
 from flightd.core.utc_time import utc_text
 from flightd.inventory.place_values import code_values, place_values
@@ -57,7 +57,13 @@ def observation_json(seen: Observation, least_confidence: float = LEAST_CONFIDEN
             }
             for read in seen.reads
         ],
+        "undecided": undecided_json(seen.undecided),
     }
+
+
+def undecided_json(codes: Sequence[UndecidedCode]) -> list[dict[str, Any]]:
+    """What was read beside the codes and does not count."""
+    return [{"symbology": code.symbology, "text": code.text, "looks": code.looks} for code in codes]
 
 
 def fill_json(fill: PlaceFill) -> dict[str, Any]:

@@ -14,9 +14,11 @@ from flightd.inventory.place_values import code_values, place_values
 
 FILL_COLUMNS: Final = ("fill", "overhang_m", "lean_m", "cases", "case_columns", "case_rows")
 DEPTH_COLUMNS: Final = ("pallets_deep", "pallets_seen")
+UNDECIDED_COLUMNS: Final = ("undecided", "undecided_looks")
 COLUMNS: Final = (
     "location", "state", "text", "symbology", "gs1", "confidence", "utc", "run", "node", "x_m", "y_m",
     "height_m", "evidence", *VALUE_COLUMNS, *FILL_COLUMNS, *DEPTH_COLUMNS,
+    *UNDECIDED_COLUMNS,
 )  # fmt: skip
 
 
@@ -45,10 +47,17 @@ def rows_of(
                     seen.run if seen else "", record.node, pose.x_m if pose else "",
                     pose.y_m if pose else "", pose.height_m if pose else "", seen.evidence if seen else "",
                     *value_cells(values), *fill_cells(seen), record.pallets_deep,
-                    record.pallets_seen,
+                    record.pallets_seen, *undecided_cells(seen),
                 ]
             )  # fmt: skip
     return rows
+
+
+def undecided_cells(seen: Observation | None) -> list[str | float]:
+    """A cell for each of `UNDECIDED_COLUMNS`: what stayed in doubt beside the codes, several behind one
+    another with " | " between, and in how many pictures each was seen."""
+    codes = seen.undecided if seen else ()
+    return [" | ".join(code.text for code in codes), " | ".join(str(code.looks) for code in codes)]
 
 
 def fill_cells(seen: Observation | None) -> list[str | float]:

@@ -159,8 +159,8 @@ class LocationVotes:
     def _undecided(
         self, believed: Sequence[PlacedRead], others: Collection[str]
     ) -> tuple[UndecidedCode, ...]:
-        """What was read beside the codes that count and is not believed, the most often seen first: no misread
-        or part of one of these, nor of the location's own label."""
+        """What was read beside the codes that count and is not believed, the most often seen first: no
+        misread or part of one of these, nor of the location's own label."""
         own = self._location, *(placed.read.text for placed in believed)
         looks: Counter[tuple[str, str]] = Counter()
         for doubtful, times in (*self._votes.in_doubt(), *self._passed):
@@ -212,8 +212,8 @@ class LocationVotes:
 
 
 def _lies_on(doubtful: PlacedRead, label: PlacedRead) -> bool:
-    """Whether the middle of what was not believed is on a label: a part of a code is smaller, and aside of the
-    code's own middle."""
+    """Whether the middle of what was not believed is on a label: a part of a code is smaller, and aside of
+    the code's own middle."""
     reach = label.size_m / 2
     return abs(doubtful.x_m - label.x_m) < reach and abs(doubtful.height_m - label.height_m) < reach
 

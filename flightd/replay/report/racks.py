@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from flightd.core.inventory import LocationRecord, LocationState
 from flightd.replay.report.markup import element, text
-from flightd.replay.report.stock import CountedStock, cases_text, fill_text, share
+from flightd.replay.report.stock import CountedStock, cases_text, fill_text, share, undecided_text
 from flightd.site.site import Location, Side, Site
 
 _HALF_COLUMNS = 30
@@ -117,6 +117,8 @@ def cell(record: LocationRecord, outcome: str) -> str:
     seen = record.observation
     parts = [record.code, STATE_NAMES[record.state], *record.texts]
     if seen is not None:
+        if seen.undecided:
+            parts.append(f"undecided: {undecided_text(seen.undecided)}")
         parts.append(share(seen.confidence))
         if seen.fill is not None and seen.fill.share is not None:
             parts.append(f"{fill_text(seen.fill)} filled")

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from flightd.core.inventory import LocationRecord, LocationState, Observation, PlaceFill
+from flightd.core.inventory import LocationRecord, LocationState, Observation, PlaceFill, UndecidedCode
 from flightd.inventory.comparison import ComparisonOutcome, Difference
 from flightd.replay.report.figures import Figure
 from flightd.replay.report.markup import number
@@ -117,6 +117,11 @@ def cases_text(fill: PlaceFill | None) -> str:
     """The cases that are seen in the front, for people; an empty text where they are not known."""
     cases = fill.cases if fill else None
     return f"{cases.count} ({cases.columns} by {cases.rows}) in the front" if cases else ""
+
+
+def undecided_text(codes: Sequence[UndecidedCode]) -> str:
+    """What was read beside the codes and does not count, for people; an empty text where nothing was."""
+    return ", ".join(f"{code.text} ({code.looks} {'look' if code.looks == 1 else 'looks'})" for code in codes)
 
 
 _LEANS_M = 0.02

@@ -17,7 +17,7 @@ from flightd.inventory.export.value_columns import value_text
 from flightd.inventory.place_values import place_values
 from flightd.replay.report.markup import NOTHING, element, table, text
 from flightd.replay.report.racks import STATE_NAMES, racks_section
-from flightd.replay.report.stock import SETTLED, CountedStock, cases_text, fill_text, share
+from flightd.replay.report.stock import SETTLED, CountedStock, cases_text, fill_text, share, undecided_text
 from flightd.site.site import Site
 from flightd.vision.jpeg import decoded_jpeg
 
@@ -92,6 +92,7 @@ def _opener(code: str) -> str:
 
 def _exceptions(count: CountedStock) -> str:
     odd = [record for state in _ORDER for record in count.records if record.state is state]
+    odd += [record for record in count.records if record.state not in _ORDER and _is_odd(record)]
     found = [record for record in odd if record.observation or count.task.includes(record)]
     apart = len(odd) - len(found)
     note = f"{apart:,} locations not visited are at nodes that this flight was not to count." if apart else ""
@@ -104,6 +105,21 @@ def _exceptions(count: CountedStock) -> str:
     return table(heads, rows, "exceptions") + _more(len(found) - len(rows), "flightd inventory show") + tail
 
 
+def _is_odd(record: LocationRecord) -> bool:
+    """Whether a person should look there: by its state, or for what stayed undecided beside its codes."""
+    seen = record.observation
+    return record.state in _ORDER or bool(seen and seen.undecided)
+
+
+def _remedy(record: LocationRecord) -> str:
+    """What to do about it."""
+    undecided = undecided_text(record.observation.undecided) if record.observation else ""
+    known = _REMEDIES.get(record.state, "")
+    return "; ".join(
+        filter(None, (known, undecided and f"something else hangs there, undecided: {undecided}"))
+    )
+
+
 def _exception(record: LocationRecord) -> str:
     seen = record.observation
     cells = [
@@ -112,7 +128,7 @@ def _exception(record: LocationRecord) -> str:
         element("td", text(", ".join(record.texts) or NOTHING)),
         element("td", share(seen.confidence) if seen else NOTHING),
         element("td", _when(seen.utc_ns) if seen else NOTHING),
-        element("td", _REMEDIES[record.state]),
+        element("td", text(_remedy(record))),
     ]
     return element("tr", *cells, data_code=record.code)
 
@@ -178,7 +194,7 @@ def _look(record: LocationRecord, outcome: str) -> dict[str, object]:
     look: dict[str, object] = {"state": record.state.value, "name": STATE_NAMES[record.state]}
     look |= {
         "texts": record.texts,
-        "odd": record.state in _ORDER,
+        "odd": _is_odd(record),
         "differs": bool(outcome),
         "rows": [[*row, outcome] for row in rows_of([record])],
     }
@@ -186,6 +202,7 @@ def _look(record: LocationRecord, outcome: str) -> dict[str, object]:
         [label, value]
         for label, value in (
             ("Codes", ", ".join(record.texts)),
+            ("Undecided", undecided_text(seen.undecided) if seen else ""),
             ("Symbology", ", ".join(dict.fromkeys(read.symbology for read in seen.reads)) if seen else ""),
             ("Values", ", ".join(value_text(value).replace("_", " ") for value in place_values(seen))),
             ("Confidence", share(seen.confidence) if seen else ""),
@@ -208,7 +225,7 @@ def _pictures(count: CountedStock, outcomes: Mapping[str, str]) -> dict[str, str
     """Small JPEGs in base64 by name, as many as the page may carry; what needs a look comes first."""
 
     def calm(record: LocationRecord) -> bool:
-        return record.code not in outcomes and record.state not in _ORDER
+        return record.code not in outcomes and not _is_odd(record)
 
     shown: dict[str, str] = {}
     room = _PICTURES_BYTES

@@ -23,7 +23,14 @@ from flightd.app.recording import FlightSetting, record_setting
 from flightd.cli.main import app
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
-from flightd.core.inventory import CaseGrid, LocationState, Observation, PlaceFill, PlannedLocation
+from flightd.core.inventory import (
+    CaseGrid,
+    LocationState,
+    Observation,
+    PlaceFill,
+    PlannedLocation,
+    UndecidedCode,
+)
 from flightd.site.site_file import load_site
 from tests.unit.cli.inventory_commands import RUNNER, code, counted_store, error_of, look, run
 
@@ -77,6 +84,31 @@ def test_what_is_known_of_the_goods_stands_beside_the_codes(tmp_path: Path) -> N
     lines = run("show", tmp_path).splitlines()
     known = "lot L1  expiry 2026-11-30  fill 62 %  cases 4 x 3  1 of 2 pallets seen"
     assert lines[:2] == [f"A-01             read         x  {known}", "A-02             empty"]
+
+
+def test_what_stayed_undecided_beside_a_code_is_told_and_is_no_code(tmp_path: Path) -> None:
+    undecided = UndecidedCode("ITF", "070429", 1), UndecidedCode("Codabar", "A\x1b1B", 3)
+    with SqliteStore(tmp_path) as store:
+        store.commit(replace(look("A-01", 1, code("x")), undecided=undecided))
+        store.commit(look("A-02", 2, code("y")))
+    shown = "undecided 070429 (1 look)  undecided A\\x1b1B (3 looks)"
+    assert run("show", tmp_path).splitlines() == [
+        f"A-01             read         x  {shown}",
+        "A-02             read         y",
+        "2 locations: 2 read",
+    ]
+    first, second = json.loads(run("show", tmp_path, "--json"))["locations"]
+    assert (first["texts"], second["observation"]["undecided"]) == (["x"], [])
+    assert first["observation"]["undecided"] == [
+        {"symbology": "ITF", "text": "070429", "looks": 1},
+        {"symbology": "Codabar", "text": "A\x1b1B", "looks": 3},
+    ]
+    rows = csv.DictReader(io.StringIO(run("export", tmp_path, "--format", "csv")))
+    assert [(row["text"], row["undecided"], row["undecided_looks"]) for row in rows] == [
+        ("x", "070429 | A\x1b1B", "1 | 3"),
+        ("y", "", ""),
+    ]
+    assert "070429" not in run("export", tmp_path, "--format", "epcis")
 
 
 @pytest.fixture

@@ -21,6 +21,7 @@ from flightd.core.inventory import (
     PlaceFill,
     PlannedLocation,
     Standing,
+    UndecidedCode,
 )
 from flightd.core.types import CodeRead
 from flightd.ground.ground_store import migrations
@@ -52,11 +53,13 @@ def look(
     state: LocationState | None = None,
     evidence: str = "",
     fill: PlaceFill | None = None,
+    undecided: tuple[UndecidedCode, ...] = (),
 ) -> SentLook:
     known = (LocationState.EMPTY, LocationState.READ, LocationState.SEVERAL)[min(len(texts), 2)]
     pose = CountPose("A1", 0.25, -1.0, 0.9, -1.57)
     reads = tuple(map(read, texts))
-    seen = Observation(run, location, at_ns, state or known, 0.875, reads, pose, evidence, fill=fill)
+    looked = run, location, at_ns, state or known, 0.875, reads, pose, evidence
+    seen = Observation(*looked, fill=fill, undecided=undecided)
     return SentLook(seen, standing)
 
 
@@ -111,6 +114,25 @@ def test_how_full_a_place_is_stands_with_its_look_and_its_place(store: GroundSto
     assert [row["fill"] for row in store.history(SITE, "A-1")] == [*reversed(fills.values())]
     store.take(batch(look("A-1", "PAL-1", run="run 2", at_ns=_BEGIN + 2 * _DAY, standing=Standing.WITHDRAWN)))
     assert store.stock(SITE)[0]["fill"] == fills[PlaceFill(None)]
+
+
+def test_what_stayed_undecided_stands_with_its_look_and_its_place_and_is_no_code(store: GroundStore) -> None:
+    undecided = (UndecidedCode("ITF", "07\0\N{SNOWMAN}", 2),)
+    store.take(batch(look("A-1", "PAL-1", undecided=undecided)))
+    told = [{"symbology": "ITF", "text": "07\0\N{SNOWMAN}", "looks": 2}]
+    (place,), (row,) = store.stock(SITE), store.history(SITE, "A-1")
+    assert (place["state"], place["texts"], place["undecided"], row["undecided"]) == (
+        "read", ["PAL-1"], told, told,
+    )  # fmt: skip
+    store.take(batch(look("A-1", "PAL-1", run="tuesday", at_ns=_BEGIN + _DAY)))
+    assert store.stock(SITE)[0]["undecided"] == []
+    assert store.differences(SITE, "tuesday") == []
+    later = look("A-1", "PAL-1", run="tuesday", at_ns=_BEGIN + _DAY, standing=Standing.WITHDRAWN)
+    store.take(batch(later))
+    assert store.stock(SITE)[0]["undecided"] == told
+    first = look("A-1", "PAL-1", undecided=undecided, standing=Standing.WITHDRAWN)
+    store.take(batch(first))
+    assert store.stock(SITE)[0]["undecided"] == []
 
 
 def test_the_same_look_counts_once_however_it_comes(store: GroundStore) -> None:
@@ -376,9 +398,8 @@ def test_a_store_from_before_places_told_how_full_they_are_is_taken_over(
         session.run("INSERT INTO place (site, code, node, state) VALUES (1, ?, ?, ?)", "A-1", "A1", "empty")
     older.close()
     with GroundStore(engine(), FolderEvidence(tmp_path / "evidence")) as store:
-        assert [(row["state"], row["fill"], row["pallets_deep"]) for row in store.stock(SITE)] == [
-            ("empty", None, 1)
-        ]
+        (row,) = store.stock(SITE)
+        assert (row["state"], row["fill"], row["pallets_deep"], row["undecided"]) == ("empty", None, 1, [])
         store.take(batch(look("A-1", "PAL-1", fill=PlaceFill(0.5))))
         assert store.stock(SITE)[0]["fill"] == {
             "share": 0.5,
@@ -408,10 +429,15 @@ def _asked(question: str) -> list[tuple[Any, ...]]:
 
 
 def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> None:
+    twice = (UndecidedCode("ITF", 'a"b,\n', 2),)
     half, unknown = PlaceFill(0.5, 0.04, 0.03, CaseGrid(4, 3)), PlaceFill(None)
     pending = look("A-2", standing=Standing.PENDING, fill=unknown)
     store.take(batch(look("A-1", 'a"b,\n', run="monday"), pending))
-    store.take(batch(look("A-1", run="tuesday", at_ns=_BEGIN + _DAY + 7), look("A-9", "x", fill=half)))
+    store.take(
+        batch(
+            look("A-1", run="tuesday", at_ns=_BEGIN + _DAY + 7), look("A-9", "x", fill=half, undecided=twice)
+        )
+    )
     store.take(batch(look("A-1", "other"), site="hall 4"))
     assert store.export(SITE, tmp_path / "it's out") == {"observations": 4, "differences": 1}
     observations = str(tmp_path / "it's out" / "observations.parquet").replace("'", "''")
@@ -426,6 +452,10 @@ def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> No
     ]  # fmt: skip
     assert (told[0][:2], told[0][5], json.loads(told[0][6])[0][1]) == ((SITE, "monday"), None, 'a"b,\n')
     assert json.loads(told[2][6])[0][1] == "x"
+    doubts = _asked(f"SELECT undecided FROM '{observations}' ORDER BY utc, location")
+    assert [json.loads(row[0]) for row in doubts] == [
+        [], [], [{"symbology": "ITF", "text": 'a"b,\n', "looks": 2}], [],
+    ]  # fmt: skip
     filled = _asked(
         "SELECT fill_asked, fill, overhang_m, lean_m, case_columns, case_rows"
         f" FROM '{observations}' ORDER BY utc, location"

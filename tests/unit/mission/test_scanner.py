@@ -89,7 +89,8 @@ def test_what_one_look_gives_beside_a_code_is_told_unless_it_is_a_neighbours() -
     reads = guess(one, "GUESS 2"), guess(three, "P2"), hover.code(here, two, "P2")
     shown = dict.fromkeys((one, two, three), Occupancy.GOODS)
     hover.scanner.take(picture(1, reads, shown, hover.now_ns + 1), here)
-    hover.run(GOODS, {code: (f"{code} P",) for code in LOCATIONS if code != two} | {two: ("P2",)})
+    labels: dict[str, tuple[str, ...]] = {code: (f"{code} P",) for code in LOCATIONS}
+    hover.run(GOODS, labels | {two: ("P2",)})
     states = {finding.state for finding in hover.found.values()}
     assert states == {LocationState.READ}
     told = {code: found.undecided for code, found in hover.found.items() if found.undecided}

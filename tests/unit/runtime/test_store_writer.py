@@ -5,12 +5,16 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
+
+import msgspec
+import pytest
 
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.counting.store_writer import StoreWriter
 from flightd.core.errors import UnavailableError
-from flightd.core.inventory import LocationRecord, LocationState, Observation, PlannedLocation
+from flightd.core.inventory import LocationRecord, LocationState, Observation, PlannedLocation, UndecidedCode
 from flightd.core.scanning import CountedPlace, Finding, Settled
 from flightd.core.types import CodeRead
 from flightd.runtime.clock import LoopClock
@@ -82,6 +86,21 @@ def run(folder: Path, refusals: int, seconds: float) -> tuple[list[LocationRecor
     with SqliteStore(folder) as store:
         writer = virtual(write(StubbornStore(store, refusals), troubles, seconds))
         return store.locations(), troubles, writer
+
+
+def test_what_stayed_undecided_is_written_and_older_findings_have_none(tmp_path: Path) -> None:
+    undecided = (UndecidedCode("ITF", "070429", 1),)
+    decode = msgspec.json.Decoder(Finding).decode
+    told = msgspec.to_builtins(replace(finding(1), undecided=undecided))
+    older = {key: value for key, value in told.items() if key != "undecided"}
+    with SqliteStore(tmp_path) as store:
+        with StoreWriter(StubbornStore(store), "run", 10**18, LoopClock(), pytest.fail, held) as writer:
+            for one in (told, older | {"location": "A-2"}):
+                writer.put(decode(msgspec.json.encode(one)), b"")
+        assert [look.undecided for place in ("A-1", "A-2") for look in store.history(place)] == [
+            undecided,
+            (),
+        ]
 
 
 def test_findings_count_only_once_they_are_confirmed(tmp_path: Path) -> None:
