@@ -117,6 +117,9 @@ class UndecidedCode:
         if self.looks < 1:
             raise ValueError(f"a code of {self.looks} looks")
 
+    def __str__(self) -> str:
+        return f"{self.text} ({self.looks} {'look' if self.looks == 1 else 'looks'})"
+
 
 @dataclass(frozen=True, slots=True)
 class Observation:

@@ -219,10 +219,8 @@ async def test_a_drone_that_does_not_tell_how_full_places_are_delivers_as_before
     async with asked(hall, tmp_path / "state", Scope.DELIVER, Scope.STOCK) as program:
         assert (await program.post("/deliveries", older))[1]["new"] == 2
         stock = (await program.page(f"/stock?{_QUERY}"))["rows"]
-        assert {row["location"]: [code["text"] for code in row["undecided"]] for row in stock} == {
-            "B-1": [],
-            "B-2": ["070429"],
-        }
+        doubts = {row["location"]: [code["text"] for code in row["undecided"]] for row in stock}
+        assert (doubts["B-1"], doubts["B-2"]) == ([], ["070429"])
         fills = {row["location"]: row["fill"] for row in stock}
         assert (fills["B-1"], fills["B-2"]) == (
             None,

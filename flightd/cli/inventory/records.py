@@ -13,7 +13,7 @@ from flightd.core.label_values import LEAST_CONFIDENCE, ValueKind
 from flightd.core.terminal_text import visible
 
 if TYPE_CHECKING:
-    from flightd.core.inventory import LocationRecord
+    from flightd.core.inventory import LocationRecord, Observation
 
 Folder: TypeAlias = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of the inventory.")]
 LeastConfidence: TypeAlias = Annotated[
@@ -30,6 +30,12 @@ def print_records(records: Sequence[LocationRecord], least_confidence: float = L
         print(f"{record.code:<16} {record.state:<11}  {'  '.join(filter(None, told))}".rstrip())
 
 
+def undecided_words(seen: Observation | None) -> Iterator[str]:
+    """What stayed undecided beside the codes of a look."""
+    for code in seen.undecided if seen else ():
+        yield f"undecided {visible(str(code))}"
+
+
 def _known(record: LocationRecord, least_confidence: float) -> Iterator[str]:
     """What stayed undecided, lot, expiry, how full the place is, and the cases in its front, as far as they
     are known."""
@@ -37,8 +43,7 @@ def _known(record: LocationRecord, least_confidence: float) -> Iterator[str]:
     from flightd.inventory.place_values import place_values
 
     seen = record.observation
-    for code in seen.undecided if seen else ():
-        yield f"undecided {visible(code.text)} ({code.looks} {'look' if code.looks == 1 else 'looks'})"
+    yield from undecided_words(seen)
     for stands in place_values(seen, least_confidence):
         if stands.kind in _SHOWN and stands.known is not None:
             yield f"{stands.kind} {visible(stands.known.text)}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightd.cli.inventory.records import Folder, LeastConfidence, print_records, states_line
+from flightd.cli.inventory.records import Folder, LeastConfidence, print_records, states_line, undecided_words
 from flightd.cli.options import AsJson
 from flightd.core.errors import InputError
 from flightd.core.label_values import LEAST_CONFIDENCE
@@ -34,8 +34,8 @@ def show(
 ) -> None:
     """Show the state of every location, or the history of one.
 
-    Beside the codes stand lot, expiry, fill and cases, where they are known. With --json each has all
-    that its labels tell: dates, quantity, weights.
+    Beside the codes stand what was read there and stayed undecided, and lot, expiry, fill and cases, where
+    they are known. With --json each has all that its labels tell: dates, quantity, weights.
 
     \b
     Examples:
@@ -74,10 +74,11 @@ def _show_history(
     from flightd.inventory.export.json_document import observation_json
 
     if as_json:
-        told = [observation_json(seen, least_confidence) for seen in looks]
-        document = {"location": location, "observations": told}
+        observations = [observation_json(seen, least_confidence) for seen in looks]
+        document = {"location": location, "observations": observations}
         print(json.dumps(document, indent=1, ensure_ascii=False))
         return
     for seen in looks:
         texts = ", ".join(visible(read.text) for read in seen.reads)
-        print(f"{utc_text(seen.utc_ns)}  {seen.state:<11} {seen.confidence:.2f}  {texts}".rstrip())
+        told = "  ".join(filter(None, (texts, *undecided_words(seen))))
+        print(f"{utc_text(seen.utc_ns)}  {seen.state:<11} {seen.confidence:.2f}  {told}".rstrip())

@@ -121,7 +121,7 @@ def cases_text(fill: PlaceFill | None) -> str:
 
 def undecided_text(codes: Sequence[UndecidedCode]) -> str:
     """What was read beside the codes and does not count, for people; an empty text where nothing was."""
-    return ", ".join(f"{code.text} ({code.looks} {'look' if code.looks == 1 else 'looks'})" for code in codes)
+    return ", ".join(map(str, codes))
 
 
 _LEANS_M = 0.02

@@ -109,6 +109,7 @@ def test_what_stayed_undecided_beside_a_code_is_told_and_is_no_code(tmp_path: Pa
         ("y", "", ""),
     ]
     assert "070429" not in run("export", tmp_path, "--format", "epcis")
+    assert run("show", tmp_path, "--location", "A-01").rstrip().endswith(f"read        0.90  x  {shown}")
 
 
 @pytest.fixture

@@ -16,7 +16,9 @@ from flightd.app.counting.store_writer import StoreWriter
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, PlannedLocation, UndecidedCode
 from flightd.core.scanning import CountedPlace, Finding, Settled
+from flightd.core.topics import Topic
 from flightd.core.types import CodeRead
+from flightd.replay.log import decoded_message
 from flightd.runtime.clock import LoopClock
 from tests.rigs.event_loops import real, virtual
 from tests.rigs.held_time import held
@@ -90,13 +92,18 @@ def run(folder: Path, refusals: int, seconds: float) -> tuple[list[LocationRecor
 
 def test_what_stayed_undecided_is_written_and_older_findings_have_none(tmp_path: Path) -> None:
     undecided = (UndecidedCode("ITF", "070429", 1),)
-    decode = msgspec.json.Decoder(Finding).decode
     told = msgspec.to_builtins(replace(finding(1), undecided=undecided))
     older = {key: value for key, value in told.items() if key != "undecided"}
-    with SqliteStore(tmp_path) as store:
+
+    async def write(store: SqliteStore) -> None:
         with StoreWriter(StubbornStore(store), "run", 10**18, LoopClock(), pytest.fail, held) as writer:
             for one in (told, older | {"location": "A-2"}):
-                writer.put(decode(msgspec.json.encode(one)), b"")
+                found = decoded_message(tmp_path, Topic.FINDING, msgspec.json.encode(one))
+                assert isinstance(found, Finding)
+                writer.put(found, b"")
+
+    with SqliteStore(tmp_path) as store:
+        virtual(write(store))
         assert [look.undecided for place in ("A-1", "A-2") for look in store.history(place)] == [
             undecided,
             (),
