@@ -212,9 +212,9 @@ class LocationVotes:
 
 
 def _lies_on(doubtful: PlacedRead, label: PlacedRead) -> bool:
-    """Whether the middle of what was not believed is on a label: a part of a code is smaller, and aside of
-    the code's own middle."""
-    reach = label.size_m / 2
+    """Whether what was not believed is on a label: its middle or, of what may be a part of a longer code, any
+    of it."""
+    reach = (label.size_m + (0.0 if doubtful.read.whole else doubtful.size_m)) / 2
     return abs(doubtful.x_m - label.x_m) < reach and abs(doubtful.height_m - label.height_m) < reach
 
 

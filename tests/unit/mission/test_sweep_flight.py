@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -16,7 +16,7 @@ from flightd.config.schema import Config
 from flightd.config.sweep import ScanMode
 from flightd.core.geometry import wrap_pi
 from flightd.core.inventory import LocationState
-from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Settled
+from flightd.core.scanning import BodyPose, CodeSet, Finding, Light, Place, Settled
 from flightd.core.types import CommandKind, Event, LandedState, Phase
 from flightd.mission import chosen_plan
 from flightd.mission.plan.flight_plan import HeadingPolicy, runs_of
@@ -194,6 +194,31 @@ def test_what_views_leave_open_is_visited_by_stopping_in_the_best_order() -> Non
     assert times["legs past shelves"][1] == 4
     assert times["stops before what was left open"][1] >= 4
     assert "nodes that are not flown past" not in times
+
+
+def test_a_second_label_that_one_picture_showed_in_passing_is_told_after_the_stop() -> None:
+    place, labels = "AL-02-1-1", labels_of(SITE)
+    flight = Sweep(stock=Stock(labels))
+    both = IdealFront(SITE, SIGHT, Stock(labels | {place: [*labels[place], Label("SECOND", -0.2, 0.1)]}))
+    see, shown = flight.front.see, Counter[str]()
+
+    def once(k: Kinematics, places: Sequence[Place], stamp_ns: int) -> CodeSet:
+        codes = both.see(k, places, stamp_ns)
+        texts = {read.text for read in codes.reads}
+        if not {"SECOND", f"PALLET {place}"} <= texts or shown["SECOND"]:
+            return see(k, places, stamp_ns)
+        shown["SECOND"] += 1
+        return codes
+
+    flight.front.see = once  # type: ignore[method-assign]
+    flight.fly()
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert flight.states == dict.fromkeys(PLACES, LocationState.READ)
+    assert "1 places to stop before: 1 a code that only one view gives" in flight.said("swept")
+    told = {found.location: found.undecided for found in flight.findings if found.undecided}
+    assert [(code, [str(one) for one in undecided]) for code, undecided in told.items()] == [
+        (place, ["SECOND (1 look)"])
+    ]
 
 
 def test_what_is_booked_is_withdrawn_at_once_where_its_code_is_found_elsewhere() -> None:

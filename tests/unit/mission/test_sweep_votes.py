@@ -197,6 +197,9 @@ def test_no_misread_of_a_label_that_was_read_nor_the_places_own_or_a_neighbours_
     misread = placed("109481000094", 1.02, sure=False)
     assert with_once(misread) == []
     assert with_once(replace(misread, height_m=1.1)) == [("109481000094", 1)]
+    beside = replace(misread, x_m=1.05)
+    assert with_once(beside) == [("109481000094", 1)]
+    assert with_once(replace(beside, read=replace(UNSURE_READ, whole=False))) == [], "half of it"
     assert with_once(placed("948193", 1.3, sure=False)) == [], "a part of the code, on its second copy"
     assert with_once(placed("02-1-1", 1.3, sure=False)) == [], "a part of the location's label"
     assert with_once(placed("070429", 1.3, sure=False), others=["070429"]) == []
