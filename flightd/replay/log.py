@@ -211,7 +211,7 @@ def _without_empty_reasons(value: object) -> object:
 
 def _with_counted_places(value: object) -> object:
     """Earlier versions told of a place that was counted before its name alone."""
-    if not isinstance(value, dict) or not value.get("counted"):
+    if not isinstance(value, dict) or not isinstance(value.get("counted"), list):
         return value
     places = [{"location": place} if isinstance(place, str) else place for place in value["counted"]]
     return value | {"counted": places}

@@ -112,3 +112,8 @@ def test_a_missing_log_is_told(tmp_path: Path) -> None:
 def test_what_was_counted_before_the_flight_is_read_back(told: str, place: CountedPlace) -> None:
     message = msgspec.json.decode(f'{{"now_ns": 7, "counted": {told}}}')
     assert recorded_tick(Path("flight.mcap"), message) == TickInput(7, counted=(place,))
+
+
+def test_what_was_counted_and_is_no_list_is_refused_in_a_line() -> None:
+    with pytest.raises(InputError, match=r"flight.mcap: a message on .* is not what this version records"):
+        recorded_tick(Path("flight.mcap"), {"now_ns": 7, "counted": 5})

@@ -278,8 +278,9 @@ class Itinerary:
 
     def recount(self, now_ns: int, due: Sequence[str], *, returning: bool) -> None:
         """Put nodes whose count was withdrawn before what is left, near as they are; they are left for the
-        next battery where the way leads home already."""
-        due = self._done_of(due)
+        next battery where the way leads home already.  One that is led from node to node flies to none by
+        itself."""
+        due = self._may_recount(now_ns, due)
         if not due:
             return
         if not returning:
@@ -294,13 +295,13 @@ class Itinerary:
             self._stops[self._next :] = rest.stops
             self._run = ()
         else:
-            self._left_over = (*due, *self._left_over)
+            self._left_over = (*due, *(node for node in self._left_over if node not in due))
         self._note_recount(now_ns, due)
 
     def recount_next(self, now_ns: int, due: Sequence[str]) -> None:
         """Visit nodes again whose count was taken back, from the goal, at which the drone rests, as soon as
         its aisle is done; one that is led from node to node flies to none by itself."""
-        due = [] if self._waits else self._reached_of(now_ns, self._done_of(due))
+        due = self._may_recount(now_ns, due)
         if not due:
             return
         aisle = self._site.nodes[self.goal.node].aisle
@@ -309,14 +310,13 @@ class Itinerary:
         self._stops[self._next + 1 :] = rest.stops
         self._note_recount(now_ns, due)
 
-    def _done_of(self, nodes: Sequence[str]) -> list[str]:
-        """Those that were visited, or that an earlier flight of the count has done: the others lie ahead."""
-        return [node for node in nodes if node in self.visited or node not in self.remaining]
-
-    def _reached_of(self, now_ns: int, nodes: Sequence[str]) -> list[str]:
-        """Those to which open lines lead from the goal; of the others it is told that they are left out."""
+    def _may_recount(self, now_ns: int, nodes: Sequence[str]) -> list[str]:
+        """Those that were visited, or that an earlier flight of the count has done, for the others lie ahead;
+        and to which open lines lead from the goal: of the rest it is told that they are left out.  None where
+        the drone is led."""
         reached = []
-        for node in nodes:
+        done = () if self._waits else nodes
+        for node in (node for node in done if node in self.visited or node not in self.remaining):
             try:
                 self._site.path(self.goal.node, node, against_one_way=True)
             except NoWayError as err:

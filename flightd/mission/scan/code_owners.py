@@ -47,10 +47,16 @@ class CodeOwners:
                 self._places.setdefault(text, set()).add(place.location)
         self._at_many |= {text for text, at in self._places.items() if len(at) > 1}
 
+    def begin(self) -> None:
+        """Another flight of the count looks at all places anew, at each once more where it has to."""
+        self._again.clear()
+
     def take(self, found: Finding) -> Contradiction | None:
-        """What contradicts the finding, which is the place's own unless it is to be looked at again."""
+        """What contradicts the finding, which is the place's own unless it is to be looked at again; what was
+        found there before is over."""
         # a text that hangs at two places surely names no single thing
         texts = _things(found.reads) - self._at_many
+        self._drop({found.location})
         twice = {text for text in texts if self._places.get(text, set()) - {found.location}}
         others = {place for text in twice for place in self._places[text]} - {found.location}
         again = ({found.location} | others) - self._again if others else set()

@@ -126,7 +126,7 @@ class LocationVotes:
         covered = self._seen[Occupancy.COVERED]
         hidden = covered > self.looks / 2 and not self._votes.any_read
         state = LocationState.OCCLUDED if hidden else LocationState.UNREADABLE
-        return self._found(state, _NO_CODE, self._pose)
+        return replace(self._found(state, _NO_CODE, self._pose), undecided=self._undecided((), others))
 
     def _is_empty(self, final: bool) -> bool:
         """Whether looks in a row show an empty place, and none ever showed that there is something."""
@@ -134,7 +134,8 @@ class LocationVotes:
         if final:
             all_empty = self._empty_in_a_row == self.looks >= _LEAST_EMPTY
             enough = enough or all_empty or self._most_empty >= self._least
-        return enough and not self.any_goods and not any(self._seen[kind] for kind in _OCCUPIED)
+        shown = self.any_goods or any(self._seen[kind] for kind in _OCCUPIED)
+        return enough and not shown and not any(passed.read.believed for passed, _ in self._passed)
 
     @property
     def _enough(self) -> bool:
@@ -160,12 +161,14 @@ class LocationVotes:
         self, believed: Sequence[PlacedRead], others: Collection[str]
     ) -> tuple[UndecidedCode, ...]:
         """What was read beside the codes that count and is not believed, the most often seen first: no
-        misread or part of one of these, nor of the location's own label."""
+        misread or part of one of these, nor of the location's own label.  Where none counts, what was sure in
+        passing: of a label that cannot be read much is misread."""
         own = self._location, *(placed.read.text for placed in believed)
         looks: Counter[tuple[str, str]] = Counter()
         for doubtful, times in (*self._votes.in_doubt(), *self._passed):
             text = doubtful.read.text
             known = text in others or any(text in whole for whole in own)
+            known = known or not (believed or doubtful.read.believed)
             if not known and not any(_lies_on(doubtful, label) for label in believed):
                 looks[doubtful.read.symbology, text] += times
         return tuple(UndecidedCode(*code, times) for code, times in looks.most_common())

@@ -167,7 +167,7 @@ class Scanner:
         self._done.clear()
         self._swept.clear()
         self._passed.clear()
-        self._owners = CodeOwners()
+        self._owners.begin()
         self._pending.begin()
         self._begun = self._begun_blind = 0
 

@@ -110,19 +110,28 @@ class SweepPlanner:
     ) -> Iterator[tuple[SweepLeg, ...]]:
         """What `legs` answers a drone that visits the nodes `run` of one aisle in this order and asks at each
         stop anew, as a flight does: what could not be flown past from one may be from the next."""
-        nodes, left, rest = self._nodes(run[0]), wanted, tuple(run)
-        while self._may_pass(nodes, rest, left):
+        nodes, left, rest = self._nodes(run[0]), wanted, list(run)
+        while rest:
+            lanes = self._lanes_at(rest, left, rest[0])
+            near = self._open_ends(nodes, [one for one in lanes if self._hindrance(nodes, one) is None])
+            if not near:
+                return
+            # from a node that no open line of theirs touches all is closed: nobody need ask there
+            skipped = list(itertools.takewhile(lambda node: node not in near, rest))  # noqa: B023
+            rest = rest[len(skipped) :]
+            if not rest:
+                return
             here = rest[0]
+            left -= {code for code in left if self._node(code) in set(skipped)}
             legs = self.legs(rest, left, here, yaw_rad, height_m)
             passed = {code for leg in legs for code in leg.locations}
             if legs:
                 yield legs
                 here = legs[-1].end
             left -= passed or {code for code in left if self._node(code) == here}
-            due = [node for node in rest if any(self._node(code) == node for code in left)]
-            rest = tuple(due)
-            if legs and due:
-                rest, _ = in_best_order(self._site, here, due, (), self._site.home.node)
+            rest = [node for node in rest if any(self._node(code) == node for code in left)]
+            if legs and rest:
+                rest = list(in_best_order(self._site, here, rest, (), self._site.home.node)[0])
 
     def judged(
         self, run: Sequence[str], wanted: frozenset[str], yaw_rad: float, height_m: float
@@ -141,11 +150,11 @@ class SweepPlanner:
             judged += [JudgedLane(replace(lane, places=part), cause) for part, cause in parts if part]
         return judged
 
-    def _may_pass(self, nodes: Sequence[str], run: Sequence[str], wanted: frozenset[str]) -> bool:
-        """Whether anything is left at the nodes `run` that can be flown past from some node."""
-        return bool(run) and any(
-            self._hindrance(nodes, lane) is None for lane in self._lanes_at(run, wanted, run[0])
-        )
+    def _open_ends(self, nodes: Sequence[str], lanes: Sequence[Lane]) -> set[str]:
+        """The nodes from which the line to a neighbour is open for one of the lanes."""
+        links = range(len(nodes) - 1)
+        open_from = {at for at in links if any(self._is_open(nodes, at, at + 1, lane) for lane in lanes)}
+        return {node for at in open_from for node in nodes[at : at + 2]}
 
     def _node(self, code: str) -> str:
         return self._site.locations[code].node

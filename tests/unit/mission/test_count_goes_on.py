@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import pytest
 
+from flightd.config.schema import Config
 from flightd.config.sweep import ScanMode
 from flightd.core.scanning import CountedPlace
 from flightd.core.types import Command, CommandKind, Phase
-from flightd.site.site import Site
+from flightd.site.site import Pad, Site
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import BARE_ENDS, SIGHT, read
 from tests.unit.mission.test_sweep_flight import Sweep, booked_of, config, flight_order, labels_of
@@ -21,22 +22,30 @@ LABELS = labels_of(BARE_ENDS) | {code: [Label("PALLET 9")] for code in (ONE, OTH
 AT_C4 = {place.code for place in BARE_ENDS.locations.values() if place.node == "C4"}
 
 
+def by_stops(mode: ScanMode = ScanMode.STOP, scan: dict[str, int] | None = None) -> Config:
+    """A drone that flies as ordered, and may change its battery."""
+    by_order = {"autostart": False, "start_countdown_s": 0.0}
+    return config().with_values(scan={"mode": mode} | (scan or {}), mission=by_order, battery={"swap": True})
+
+
 def going_on(
     left: Collection[str],
     site: Site = BARE_ENDS,
     mode: ScanMode = ScanMode.STOP,
     levels: tuple[int, ...] = (),
+    *,
+    waits: bool = False,
+    scan: dict[str, int] | None = None,
 ) -> Sweep:
     """A flight to the nodes at which places were left uncounted; the others were read as they are."""
-    by_order = {"autostart": False, "start_countdown_s": 0.0}
-    params = config().with_values(scan={"mode": mode}, mission=by_order, battery={"swap": True})
-    flight = Sweep(params, Stock(LABELS), site)
+    flight = Sweep(by_stops(mode, scan), Stock(LABELS), site)
     counted = [
         CountedPlace(code, (read(LABELS[code][0].text),)) for code in site.locations if code not in left
     ]
     flight.scanner.go_on_with(counted)
-    nodes = tuple(dict.fromkeys(site.locations[code].node for code in left))
-    flight.mission.command(Command("1", CommandKind.PLAN, nodes=nodes, levels=levels), flight.now_ns)
+    nodes = tuple(sorted({site.locations[code].node for code in left}))
+    plan = Command("1", CommandKind.PLAN, nodes=nodes, levels=levels, waits=waits)
+    flight.mission.command(plan, flight.now_ns)
     flight.run(0.2)
     flight.order(CommandKind.START)
     return flight
@@ -88,6 +97,72 @@ def test_a_place_to_which_no_open_way_leads_is_told_and_the_other_looked_at_agai
     assert flight.mission.state.on_pad, flight.mission.reason
     assert [text.split(":")[0] for text in flight.said("recount")] == ["A2 left out", "C4 to visit again"]
     assert sorted(booked_of(flight)) == sorted(AT_C4)
+
+
+def relocated(flight: Sweep) -> None:
+    """Until it has lost its position, and found it again."""
+    flight.integrity = 0.3
+    flight.fly(30.0, until=lambda: flight.phase is Phase.RELOCATE)
+    assert flight.phase is Phase.RELOCATE, flight.mission.reason
+    flight.integrity = 1.0
+    flight.fly(30.0, until=lambda: flight.phase is not Phase.RELOCATE)
+    flight.fly(1.0)
+
+
+def test_a_place_that_cannot_be_reached_costs_no_other_its_look_after_a_doubt() -> None:
+    flight = going_on(
+        {code for code, place in BARE_ENDS.locations.items() if place.node in {"B3", "C4"}},
+        replace(BARE_ENDS, blocked=(("A1", "A2"), ("A2", "A3"))),
+        scan={"confirm_stops": 20},
+    )
+    flight.fly(900.0, until=lambda: bool(flight.said("contradiction")))
+    flight.scanner.withdraw(flight.now_ns, "its labels are another node's")
+    flight.scanner.doubted = True
+    for wanted in (True, False):
+        flight.fly(30.0, until=lambda: (flight.phase is Phase.RELOCATE) is wanted)  # noqa: B023
+    flight.fly(900.0)
+    assert flight.mission.state.on_pad, flight.mission.reason
+    assert "A2" in {text.split(" left out")[0] for text in flight.said("recount")}
+    assert not flight.scanner.wants("B3")
+    assert not flight.scanner.wants("C4")
+
+
+def test_one_that_is_led_flies_to_no_place_by_itself_after_a_doubt() -> None:
+    flight = going_on(AT_C4, waits=True)
+    flight.fly(900.0, until=lambda: bool(flight.said("contradiction")))
+    relocated(flight)
+    goals = set[str]()
+
+    def holds() -> bool:
+        goals.add(flight.mission.goal.node)
+        return flight.phase is Phase.HOLD
+
+    flight.fly(300.0, until=holds)
+    assert flight.phase is Phase.HOLD
+    assert goals == {"C4"}
+    assert flight.said("recount") == []
+
+
+def test_the_next_flight_of_a_daemon_is_compared_with_the_one_before() -> None:
+    hall = replace(BARE_ENDS, pads=(*BARE_ENDS.pads, Pad("dock", "C5", 0.5, start=False, shared=True)))
+    flight = Sweep(by_stops(), Stock(LABELS), hall)
+    flight.run(0.2)
+    for node, lands in (("A2", True), ("C4", False)):
+        flight.order(CommandKind.PLAN, nodes=(node,), waits=lands)
+        flight.run(0.2)
+        flight.order(CommandKind.START)
+        if lands:
+            flight.fly(300.0, until=lambda: flight.phase is Phase.HOLD)
+            flight.order(CommandKind.GOTO, "C5", lands=True)
+        flight.fly(900.0)
+        flight.down()
+        flight.run(0.1)
+        flight.set(height_m=0.1)
+        flight.run(0.2)
+    first, *_ = flight.said("contradiction")
+    assert first == f"one code at {ONE} and {OTHER}: to be looked at again"
+    withdrawn = [code for one in flight.settled if one.booked for code in one.locations]
+    assert sorted(withdrawn) == [ONE, OTHER]
 
 
 def came_down(flight: Sweep) -> Phase:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from itertools import pairwise
 
@@ -15,6 +16,7 @@ from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.schema import Config
 from flightd.mission.plan.itinerary import in_best_order
 from flightd.mission.plan.leg_times import Pace
+from flightd.mission.plan.sweep_leg import SweepLeg
 from flightd.mission.scan.code_assignment import Assigner, FrontSight
 from flightd.mission.scan.sweep_planner import SweepPlanner
 from flightd.mission.scan.sweep_speed import SweepOptics
@@ -191,6 +193,26 @@ def test_a_one_way_aisle_is_counted_by_stopping() -> None:
     everything = frozenset(site.locations)
     assert not planner.legs(("A1", "A2", "A3"), everything, "A1", 0.0, 1.0)
     assert planner.legs(("B1", "B2", "B3"), everything, "B1", 0.0, 1.0)
+
+
+def test_nobody_asks_at_each_node_of_a_closed_aisle_what_may_be_flown_past(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each question goes through all lanes, and a flight asks at each of its stops, in a control tick."""
+    asked = list[str]()
+
+    def legs(planner: SweepPlanner, run: Sequence[str], *args: object) -> tuple[SweepLeg, ...]:
+        asked.append(run[0])
+        return asks(planner, run, *args)  # type: ignore[arg-type]
+
+    asks = SweepPlanner.legs
+    monkeypatch.setattr(SweepPlanner, "legs", legs)
+    site = parse_site(ONE_WAY, "one way")
+    everything = frozenset(site.locations)
+    assert not list(sweeps(site).stop_by_stop(("A1", "A2", "A3"), everything, 0.0, 1.0))
+    assert asked == []
+    assert list(sweeps(site).stop_by_stop(("B1", "B2", "B3"), everything, 0.0, 1.0))
+    assert asked == ["B1"]
 
 
 def test_the_plan_says_once_what_is_alike_and_what_limits_it() -> None:

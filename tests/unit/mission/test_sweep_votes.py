@@ -90,6 +90,26 @@ def told_by(found: Finding | Undecided | None) -> tuple[str, list[str], list[tup
     return found.state.value, codes, [(code.text, code.looks) for code in found.undecided]
 
 
+@pytest.mark.parametrize(
+    ("sure", "occupancy", "told"),
+    [
+        (True, EMPTY, ("unreadable", [("PALLET 9", 1)])),
+        (True, GOODS, ("unreadable", [("PALLET 9", 1)])),
+        (False, EMPTY, ("empty", [])),
+        (False, GOODS, ("unreadable", [])),
+    ],
+)
+def test_where_a_code_was_surely_read_in_passing_no_stop_tells_an_empty_place(
+    sure: bool, occupancy: Occupancy, told: tuple[str, list[tuple[str, int]]]
+) -> None:
+    votes = LocationVotes(CODE, "A2", PARAMS.pictures, [(placed("PALLET 9", sure=sure), 1)])
+    fill = PlaceFill(0.0) if occupancy is EMPTY else None
+    for seq in range(4):
+        votes.add(seq, pose(seq), PlaceLook(CODE, QUAD, 1.0, occupancy, fill=fill), ())
+    state_told, codes, undecided = told_by(votes.finding(True))
+    assert ((state_told, undecided), codes) == (told, [])
+
+
 UNSURE_READ = read("109481000094", sure=False)
 NOTHING_AT_ALL: Sequence[Sequence[PlacedRead]] = ((),) * 8
 NOTHING: Sequence[Sequence[PlacedRead]] = ((),) * 6
