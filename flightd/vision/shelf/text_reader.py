@@ -1,7 +1,9 @@
 """Printed text on labels, read by the networks of rapidocr (PP-OCR), whose models come with the package.
 
 Lines are found by its detector and cut out here: its own boxes end at the last stroke, and half a letter is
-read as another one with great confidence.  Each line is read twice, with more and with less room around it.
+read as another one with great confidence.  They are looked for on everything that looks like a label, and
+then in all of the picture: dates are printed on the goods' own wrapping, too.  Each line is read with little
+room around it, and what then says something a second time, with more.
 Needs the extra `ocr`; nothing of it is imported before the first picture.
 """
 
@@ -9,7 +11,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -22,11 +24,12 @@ from flightd.core.extras import missing_extra
 from flightd.core.geometry import Matrix
 from flightd.core.label_text import TextLine, TextLook
 from flightd.core.types import Image
-from flightd.vision.shelf.label_regions import label_regions
+from flightd.vision.shelf.label_regions import Box, label_regions
 
 _LONGEST_SIDE_PX: Final = 1280
 """Larger regions are shrunk for finding lines, not for reading them."""
-_MOST_LINES: Final = 24
+_MOST_LINES: Final = 96
+"""Of one picture: what is written on goods is much, and a date stands below it."""
 _LINE_PX: Final = 48
 """Height at which the network reads."""
 _ROOMS: Final = ((0.35, 0.05), (0.60, 0.15))
@@ -65,17 +68,21 @@ class TextReader:
             params={**one_thread, **sizes, "Global.log_level": "critical", "Global.text_score": 0.0}
         )
 
-    def read(self, bgr: Image) -> tuple[TextLine, ...]:
-        """The lines on everything in a picture, (H, W, 3) BGR, that looks like a label; of all of it where
-        nothing does."""
+    def read(self, bgr: Image, wanted: Callable[[TextLook], bool] | None = None) -> tuple[TextLine, ...]:
+        """The lines in a picture, (H, W, 3) BGR, those on labels first.  Where it is given, only what is
+        `wanted` by its first look gets a second one."""
         height, width = bgr.shape[:2]
-        regions = label_regions(bgr) or [(0, 0, width, height)]
+        labels = label_regions(bgr)
         found: list[TextLine] = []
-        for x0, y0, x1, y1 in regions:
+        for box in (*labels, (0, 0, width, height)):
+            x0, y0, x1, y1 = box
             region = np.ascontiguousarray(bgr[y0:y1, x0:x1])
             centre = (width - 1) / 2 - x0, (height - 1) / 2 - y0
-            strips = self._strips(region)[: _MOST_LINES - len(found)]
-            found += [self._line(region, strip, centre) for strip in strips]
+            strips = self._strips(region)
+            if box not in labels:
+                strips = [strip for strip in strips if not any(_is_inside(strip, label) for label in labels)]
+            strips = strips[: _MOST_LINES - len(found)]
+            found += [self._line(region, strip, centre, wanted) for strip in strips]
         return tuple(line for line in found if any(look.text for look in line.looks))
 
     def _strips(self, region: Image) -> list[_Strip]:
@@ -83,11 +90,20 @@ class TextReader:
         strips = [] if boxes is None else [_Strip.of(np.asarray(box, np.float64)) for box in boxes]
         return _joined(sorted(strips, key=lambda strip: (strip.middle[1], strip.middle[0])))
 
-    def _line(self, region: Image, strip: _Strip, centre: tuple[float, float]) -> TextLine:
-        looks = tuple(self._look(strip.cut_out(region, *room)) for room in _ROOMS)
+    def _line(
+        self,
+        region: Image,
+        strip: _Strip,
+        centre: tuple[float, float],
+        wanted: Callable[[TextLook], bool] | None,
+    ) -> TextLine:
+        first, *others = _ROOMS
+        looks = [self._look(strip.cut_out(region, *first))]
+        if wanted is None or wanted(looks[0]):
+            looks += [self._look(strip.cut_out(region, *room)) for room in others]
         doubts = strip.doubts(region)
         corners = tuple((round(x - centre[0], 1), round(y - centre[1], 1)) for x, y in strip.corners())
-        return TextLine(corners, looks, doubts.left, doubts.right, doubts.gap, round(doubts.glare, 3))
+        return TextLine(corners, tuple(looks), doubts.left, doubts.right, doubts.gap, round(doubts.glare, 3))
 
     def _look(self, line: Image) -> TextLook:
         out = self._engine(line, use_det=False, use_cls=False, use_rec=True, return_word_box=True)
@@ -184,6 +200,11 @@ class _Strip:
         way = other.corners()[[0, 3]].mean(axis=0) - self.corners()[[1, 2]].mean(axis=0)
         gap, off = float(way @ self.along), float(way @ self.down)
         return -height < gap < _JOINED_GAP * height and abs(off) < 0.4 * height
+
+
+def _is_inside(strip: _Strip, box: Box) -> bool:
+    (x, y), (x0, y0, x1, y1) = strip.middle, box
+    return bool(x0 <= x < x1 and y0 <= y < y1)
 
 
 def _longest_run(flags: NDArray[np.bool_]) -> int:

@@ -43,6 +43,13 @@ def text_values(lines: Sequence[TextLine], patterns: Sequence[LabelTextConfig]) 
     return tuple(found.values())
 
 
+def says_something(look: TextLook, patterns: Sequence[LabelTextConfig]) -> bool:
+    """Whether a look at a line has a value for one of the patterns, however unsure: without one it has none
+    by more looks either."""
+    alone = TextLine(((0.0, 0.0),) * 4, (look,))
+    return any(_read(look, alone, pattern)[0] is not None for pattern in patterns)
+
+
 def _value(line: TextLine, pattern: LabelTextConfig) -> LabelValue | None:
     told = [_read(look, line, pattern) for look in line.looks]
     values = {value for value, _ in told if value is not None}

@@ -117,6 +117,31 @@ def test_lines_are_read_and_a_cut_one_is_not_believed() -> None:
     assert all(value.confidence == 0.0 for value in cut), [told_text(value.value) for value in cut]
 
 
+def test_what_is_printed_on_the_goods_beside_a_label_and_below_much_text_is_read_too() -> None:
+    pytest.importorskip("rapidocr")
+    picture = np.full((1000, 1000, 3), 60, np.uint8)
+    picture[:400, :700] = shelf(*LINES)
+    for number in range(30):
+        text, x_px, y_px = f"SUGAR {number}", 40 + 480 * (number % 2), 440 + 34 * (number // 2)
+        cv2.putText(picture, text, (x_px, y_px), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (220,) * 3, 2, cv2.LINE_AA)
+    cv2.putText(
+        picture, "USE BY 2027.03.14", (40, 975), cv2.FONT_HERSHEY_SIMPLEX, 1.0, (220,) * 3, 2, cv2.LINE_AA
+    )
+    patterns = (
+        LabelTextConfig(kind="lot", pattern=r"LOT\s*([A-Z]\d{4})"),
+        LabelTextConfig(kind="expiry", pattern=r"USE BY ?(\d{4}\.\d{2}\.\d{2})", dates=("%Y.%m.%d",)),
+    )
+    told = {
+        str(one.kind): (told_text(one.value), one.confidence)
+        for one in TextSearch(patterns)(evidence_jpeg(picture))
+    }
+    assert {kind: text for kind, (text, _) in told.items()} == {"lot": "B1203", "expiry": "2027-03-14"}
+    assert min(sure for _, sure in told.values()) > 0.9
+    lines = TextReader().read(picture, lambda look: "USE" in look.text)
+    assert {len(line.looks) for line in lines if "SUGAR" in line.looks[0].text} == {1}
+    assert {len(line.looks) for line in lines if "USE" in line.looks[0].text} == {2}
+
+
 def test_the_commands_read_photographs_and_kept_pictures(tmp_path: Path) -> None:
     pytest.importorskip("rapidocr")
     config = tmp_path / "hall-flight.toml"
