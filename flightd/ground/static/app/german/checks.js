@@ -59,10 +59,11 @@ export default {
   "camera.cx_px {cx}, cy_px {cy}": "camera.cx_px {cx}, cy_px {cy}",
   "far from the picture's middle": "weit von der Bildmitte",
   "camera.distortion folds the picture over itself": "camera.distortion faltet das Bild über sich selbst",
-  "fly lower (mission.height_m), use larger pictures or a longer lens: {needed} px needed": "fliegen Sie tiefer (mission.height_m), nehmen Sie größere Bilder oder eine längere Brennweite: Nötig sind {needed} px",
+  "fly lower (mission.height_m), use larger pictures or a longer lens: {needed} px needed": "tiefer fliegen (mission.height_m), größere Bilder oder eine längere Brennweite: Nötig sind {needed} px",
   "camera.fx_px and fy_px are not given: a guess is used": "camera.fx_px und fy_px fehlen: Es gilt eine Schätzung",
   "nothing yet of this camera, as it is configured": "noch nichts über diese Kamera, wie sie konfiguriert ist",
-  "beyond the configuration: delay {delay} ms (sigma {sigma}), mount roll {roll} and pitch {pitch} deg (sigma {mount})": "über die Konfiguration hinaus: Verzögerung {delay} ms (Sigma {sigma}), Einbau gerollt {roll} und genickt {pitch} Grad (Sigma {mount})",
+  "beyond the configuration: delay {delay} ms (sigma {sigma}), mount roll {roll} and pitch {pitch} deg (sigma {mount}), height {height} (sigma {h})": "über die Konfiguration hinaus: Verzögerung {delay} ms (Sigma {sigma}), Einbau gerollt {roll} und genickt {pitch} Grad (Sigma {mount}), Höhe {height} (Sigma {h})",
+  "check the range finder": "Entfernungsmesser prüfen",
   "camera.latency_s = {seconds}": "camera.latency_s = {seconds}",
   "the next flight writes it anew": "der nächste Flug schreibt es neu",
   // exposure
