@@ -107,6 +107,11 @@ class SensorEstimate:
         """Whether any line was seen; all numbers are NaN before."""
         return not math.isnan(self.delay_s)
 
+    @property
+    def focal_share(self) -> float:
+        """By which share the focal length is longer than configured."""
+        return 1.0 / (1.0 + self.scale_share) - 1.0
+
 
 NOT_SEEN = SensorEstimate()
 """Nothing is known yet, or a log does not tell it."""

@@ -126,7 +126,7 @@ def sensor_rows(found: FittedSensors, camera: CameraConfig, online: SensorEstima
             camera.fx_px,
             camera.fx_px * math.expm1(focal),
             camera.fx_px * focal_sigma,
-            seen=(camera.fx_px * (1.0 / (1.0 + online.scale_share) - 1.0), camera.fx_px * online.scale_sigma),
+            seen=(camera.fx_px * online.focal_share, camera.fx_px * online.scale_sigma),
             note="if the range finder is right",
         ),
         row(

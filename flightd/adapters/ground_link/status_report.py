@@ -84,7 +84,7 @@ def _sensors(known: SensorEstimate) -> SensorReport:
         mount_yaw_deg=degrees(known.mount_yaw_rad),
         mount_yaw_sigma_deg=degrees(known.mount_yaw_sigma_rad),
         shake_deg=degrees(known.shake_rad),
-        focal_percent=percent(1.0 / (1.0 + known.scale_share) - 1.0),
+        focal_percent=percent(known.focal_share),
         focal_sigma_percent=percent(known.scale_sigma),
         height_percent=percent(known.height_share),
         height_sigma_percent=percent(known.height_sigma),

@@ -314,9 +314,12 @@ class Itinerary:
         """Those that were visited, or that an earlier flight of the count has done, for the others lie ahead;
         and to which open lines lead from the goal: of the rest it is told that they are left out.  None where
         the drone is led."""
+        if self._waits:
+            return []
         reached = []
-        done = () if self._waits else nodes
-        for node in (node for node in done if node in self.visited or node not in self.remaining):
+        for node in nodes:
+            if node in self.remaining and node not in self.visited:
+                continue
             try:
                 self._site.path(self.goal.node, node, against_one_way=True)
             except NoWayError as err:

@@ -225,7 +225,7 @@ def _scales(flight: RecordedFlight) -> Figure | None:
     seen = flight.sensors
     if math.isnan(seen.height_share):
         return None
-    focal = number(100.0 * (1.0 / (1.0 + seen.scale_share) - 1.0), 1)
+    focal = number(100.0 * seen.focal_share, 1)
     sigma = number(100.0 * seen.height_sigma, 1)
     note = f"± {sigma}, more than told; focal length {focal} % more than configured"
     return Figure("Height", f"{100.0 * seen.height_share:+.1f}", "%", note)

@@ -74,7 +74,7 @@ class TextReader:
         height, width = bgr.shape[:2]
         labels = label_regions(bgr)
         found: list[TextLine] = []
-        for box in (*labels, (0, 0, width, height)):
+        for box in dict.fromkeys((*labels, (0, 0, width, height))):
             x0, y0, x1, y1 = box
             region = np.ascontiguousarray(bgr[y0:y1, x0:x1])
             centre = (width - 1) / 2 - x0, (height - 1) / 2 - y0

@@ -44,8 +44,8 @@ def text_values(lines: Sequence[TextLine], patterns: Sequence[LabelTextConfig]) 
 
 
 def says_something(look: TextLook, patterns: Sequence[LabelTextConfig]) -> bool:
-    """Whether a look at a line has a value for one of the patterns, however unsure: without one it has none
-    by more looks either."""
+    """Whether a look at a line has a value for one of the patterns, however unsure: without one no other look
+    makes the line sure."""
     alone = TextLine(((0.0, 0.0),) * 4, (look,))
     return any(_read(look, alone, pattern)[0] is not None for pattern in patterns)
 
