@@ -1,15 +1,15 @@
 """A folder that is shared with other programs or machines, here or wherever fsspec reaches.
 
 Files get their names by renaming: nobody sees half of one.  That holds where renaming is one step, as on a
-disk and over SFTP.
+disk and over SFTP.  A bucket of S3 renames by copying, but shows an object once all of it is there.
 """
 
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias
 from urllib.parse import urlsplit
@@ -17,10 +17,12 @@ from urllib.parse import urlsplit
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.extras import missing_extra
 from flightd.runtime.durable_files import sync_folder
+from flightd.runtime.remote_errors import remote_errors
 
 PASSWORD = "FLIGHTD_SFTP_PASSWORD"  # noqa: S105 - the name of a variable
 Stamp: TypeAlias = tuple[int, str]
 """Size and time of a file: another whenever it is written."""
+_BUCKETS = frozenset({"s3", "s3a"})
 _WRITTEN_STILL = (".tmp", ".part", ".partial", ".filepart", ".crdownload", "~")
 
 
@@ -43,7 +45,11 @@ class SharedFolder:
         self.address = address
         with self._refusals("cannot be opened"):
             self._files, self._path = file_system(address, file, key, what)
-            if make:
+            self._is_bucket = urlsplit(address).scheme in _BUCKETS
+            if self._is_bucket:
+                # Its folders are but names.  A bucket has an owner, rights and a price: none is made here.
+                self._files.call_s3("head_bucket", Bucket=self._path.partition("/")[0])
+            elif make:
                 self._files.makedirs(self._path, exist_ok=True)
             elif not self._files.isdir(self._path):
                 self.close()
@@ -65,7 +71,7 @@ class SharedFolder:
             self._files.invalidate_cache()
             found = {PurePosixPath(one["name"]).name: one for one in self._files.ls(path, detail=True)}
         return {
-            name: (int(one["size"] or 0), str(one.get("mtime") or one.get("created")))
+            name: (int(one["size"] or 0), str(one.get("mtime") or one.get("created") or one.get("ETag")))
             for name, one in found.items()
             if one["type"] == "file" and not name.startswith(".") and not name.endswith(_WRITTEN_STILL)
         }
@@ -86,6 +92,9 @@ class SharedFolder:
         path = PurePosixPath(name)
         beside = self._at(str(path.with_name(f".{path.name}.tmp")))
         with self._refusals(f"{name} cannot be written"):
+            if self._is_bucket:
+                self._files.pipe_file(self._at(name), data)
+                return
             self._make(name)
             with self._files.open(beside, "wb") as stream:
                 stream.write(data)
@@ -110,6 +119,8 @@ class SharedFolder:
     def _make(self, name: str) -> None:
         """The folder of ours in which a file shall be."""
         parent = str(PurePosixPath(name).parent)
+        if self._is_bucket:
+            return
         if parent != "." and not self._files.isdir(self._at(parent)):
             self._files.makedirs(self._at(parent), exist_ok=True)
 
@@ -123,7 +134,7 @@ class SharedFolder:
     def _refusals(self, what: str) -> Iterator[None]:
         try:
             yield
-        except _refused_by() as err:
+        except remote_errors() as err:
             text = getattr(err, "strerror", None) or str(err) or type(err).__name__
             raise UnavailableError(
                 f"{self.address}: {what}: {text}",
@@ -139,8 +150,11 @@ def file_system(address: str, file: Path | str, key: str, what: str) -> tuple[An
         import fsspec
     except ModuleNotFoundError:
         raise missing_extra("exchange", what) from None
-    if urlsplit(address).scheme in {"sftp", "ssh"}:
+    scheme = urlsplit(address).scheme
+    if scheme in {"sftp", "ssh"}:
         return _sftp(address, file, key)
+    if scheme in _BUCKETS and find_spec("s3fs") is None:
+        raise missing_extra("s3", "s3://…")
     files, path = fsspec.core.url_to_fs(address, skip_instance_cache=True)
     return files, str(path)
 
@@ -163,11 +177,3 @@ def _sftp(address: str, file: Path | str, key: str) -> tuple[Any, str]:
     given = {"port": parts.port, "username": parts.username, "password": os.environ.get(PASSWORD)}
     asked = {name: value for name, value in given.items() if value}
     return KnownHostSftp(parts.hostname, skip_instance_cache=True, **asked), parts.path
-
-
-def _refused_by() -> tuple[type[Exception], ...]:
-    """What file systems raise; those of SFTP and S3 have errors of their own, where they are in use."""
-    paramiko, boto = sys.modules.get("paramiko"), sys.modules.get("botocore.exceptions")
-    ssh = () if paramiko is None else (paramiko.SSHException,)
-    s3 = () if boto is None else (boto.BotoCoreError, boto.ClientError)
-    return (OSError, EOFError, ValueError, ImportError, *ssh, *s3)

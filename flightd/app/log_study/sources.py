@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from flightd.core.errors import InputError, UnavailableError
+from flightd.runtime.remote_errors import remote_errors
 
 _ENDING: Final = ".mcap"
 _TRUTH: Final = "truth"
@@ -37,7 +38,7 @@ class LogSource:
         with TemporaryDirectory(prefix="flightd-study-") as made:
             try:
                 _fetch(files, PurePosixPath(path), Path(made))
-            except OSError as err:
+            except remote_errors() as err:
                 raise UnavailableError(f"cannot be fetched: {err}", file=self.place) from None
             yield Path(made) / PurePosixPath(path).name
 
@@ -71,7 +72,7 @@ def _remote(url: str) -> Iterator[LogSource]:
     scheme = url.partition("://")[0]
     try:
         names = [path] if path.endswith(_ENDING) else sorted(files.find(path))
-    except OSError as err:
+    except remote_errors() as err:
         raise UnavailableError(f"cannot be listed: {err}", file=url) from None
     for name in names:
         if _is_flight(PurePosixPath(name).name):
@@ -100,10 +101,10 @@ def _file_system(url: str) -> tuple[Any, str]:
         import fsspec
     except ImportError:
         raise UnavailableError(
-            "needs fsspec", file=url, remedy="pip install 'flightd[study]', for S3 s3fs beside it"
+            "needs fsspec", file=url, remedy="pip install 'flightd[study]', for S3 'flightd[s3]'"
         ) from None
     try:
         files, path = fsspec.core.url_to_fs(url)
-    except (ImportError, ValueError, OSError) as err:
+    except remote_errors() as err:
         raise UnavailableError(f"cannot be opened: {err}", file=url) from None
     return files, str(path)

@@ -9,10 +9,11 @@ import psycopg
 import pytest
 
 from flightd.ground.ground_store.engine import Engine
-from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.evidence import Evidence, FolderEvidence, SharedEvidence
 from flightd.ground.ground_store.postgres_engine import PostgresEngine
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
+from tests.rigs.extras import of_extra
 from tests.rigs.postgres import postgres
 from tests.rigs.wms_exchange import Cuts, cut_exchanges, make_place
 
@@ -33,6 +34,19 @@ def engine(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[
     with psycopg.connect(url, autocommit=True) as connection:
         connection.execute("DROP SCHEMA IF EXISTS flightd CASCADE")
     yield lambda: PostgresEngine(url)
+
+
+@pytest.fixture
+def pictures(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Evidence]:
+    """Each engine has its own: a file a folder, PostgreSQL a bucket of S3."""
+    if request.node.callspec.params["engine"] == "sqlite":
+        yield FolderEvidence(tmp_path / "evidence")
+        return
+    of_extra("s3fs", "s3")
+    from tests.rigs.s3_server import s3_server
+
+    with s3_server() as url:
+        yield SharedEvidence(f"{url}/pictures")
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from flightd.ground.decision_book import Decided, Decision, DecisionBook
 from flightd.ground.ground_store import sender
 from flightd.ground.ground_store.deliver_folder import deliver_path
 from flightd.ground.ground_store.engine import Engine, Row, Session
-from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.evidence import Evidence, FolderEvidence
 from flightd.ground.ground_store.postgres_engine import PostgresSession
 from flightd.ground.ground_store.prune import prune
 from flightd.ground.ground_store.sender import Delivered, deliver_inventory
@@ -115,13 +115,13 @@ def same(store: GroundStore, inventory: SqliteStore) -> None:
 
 
 def test_two_hundred_cuts_lose_nothing_and_double_nothing(
-    engine: Callable[[], Engine], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    engine: Callable[[], Engine], pictures: Evidence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """While the drone goes on counting, confirming, withdrawing."""
     monkeypatch.setattr(sender, "MOST_LOOKS", 4)
     draw = random.Random(18)
     real = engine()
-    store = GroundStore(real, FolderEvidence(tmp_path / "evidence"))
+    store = GroundStore(real, pictures)
     cuts = Cuts(real, draw, each=14)
     store._engine = cuts  # type: ignore[assignment]  # noqa: SLF001
     number = 0

@@ -85,10 +85,7 @@ def test_pictures_of_a_store_lie_on_another_machine(host: str, tmp_path: Path) -
 
 
 def test_a_place_for_pictures_that_cannot_be_had_is_one_line(tmp_path: Path) -> None:
-    for url, said in (
-        ("nowhere://bucket/pictures", "Protocol not known: nowhere"),
-        ("s3://bucket/pictures", "cannot be opened"),
-    ):
-        with pytest.raises(UnavailableError, match=said) as refused:
-            opened_store(str(tmp_path / "counts.db"), url)
-        assert str(refused.value).startswith(f"--evidence: {url}: cannot be opened: ")
+    url = "nowhere://bucket/pictures"
+    with pytest.raises(UnavailableError) as refused:
+        opened_store(str(tmp_path / "counts.db"), url)
+    assert str(refused.value).startswith(f"--evidence: {url}: cannot be opened: Protocol not known: nowhere")
