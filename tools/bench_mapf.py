@@ -2,7 +2,7 @@
 
 Both plan the same drones on the same floors by MAPF's rules: a drone is a point, goes one node in a step or
 waits, may follow another one directly, shares no node and swaps with nobody, and begins at a node to stay on
-its goal for good.  flightd's turns and climbs take no time here, and it flies 2 m a second on nodes 2 m apart.
+its goal for good.  flightd's turns and climbs take no time here; it flies 2 m a second on nodes 2 m apart.
 
 Printed, a line of JSON for each case: the steps until the last drone of all is there, by each solver, null
 where it finds no plan; and the longest of the shortest ways, which no plan can beat.  Exit 1 where flightd's
@@ -10,8 +10,8 @@ is longer than 1.2 times the best of the solvers named by --of.
 
 python -m tools.bench_mapf [--lacam3 build/main] [--seeds 1 2 3 4] [--of pypibt py-lacam]
 
-Solvers are taken where they are: lacam3's program by --lacam3, the Python packages pypibt and pycam (py-lacam)
-from PYTHONPATH.  Their sources: github.com/Kei18/lacam3, pypibt, py-lacam.
+Solvers are taken where they are: lacam3's program by --lacam3, the Python packages pypibt and pycam
+(py-lacam) from PYTHONPATH.  Their sources: github.com/Kei18/lacam3, pypibt, py-lacam.
 """
 
 from __future__ import annotations
