@@ -15,7 +15,8 @@ def sensor_summary(simulation: Simulation, seen: SensorEstimate) -> dict[str, An
     """The summary's part on the sensors, of which the lines said `seen` last: `estimated`, `estimated_sigma`
     and `drawn`, the same keys each.
 
-    The camera's delay is whole, configuration included; the mount's angles are beyond the configured ones;
+    The camera's delay is whole, configuration included; the mount's angles and the focal length are beyond
+    the configured ones; the height is by how much the told one is too small for good, which no world draws;
     the tilt bias is by how much the told roll and pitch are too large, as two angles and their hypotenuse.
     None for what nobody estimates, and before any line was seen."""
     return {
@@ -32,6 +33,7 @@ def _estimated(seen: SensorEstimate, latency_s: float) -> Known:
         mount_pitch_deg=math.degrees(seen.mount_pitch_rad),
         mount_yaw_deg=math.degrees(seen.mount_yaw_rad),
         tilt=(-math.degrees(seen.tilt_roll_rad), -math.degrees(seen.tilt_pitch_rad)),
+        shares=(seen.focal_share, seen.height_share),
     )
 
 
@@ -43,6 +45,7 @@ def _sigma(seen: SensorEstimate) -> Known:
         mount_pitch_deg=mount_deg,
         mount_yaw_deg=math.degrees(seen.mount_yaw_sigma_rad),
         tilt=(tilt_deg, tilt_deg),
+        shares=(seen.scale_sigma, seen.height_sigma),
     )
     return known | {"tilt_bias_deg": known["tilt_roll_deg"]}
 
@@ -56,6 +59,7 @@ def _drawn(simulation: Simulation) -> Known:
         mount_pitch_deg=math.degrees(unknowns.mount_pitch_rad),
         mount_yaw_deg=math.degrees(unknowns.mount_yaw_rad),
         tilt=(math.degrees(roll_rad), math.degrees(pitch_rad)),
+        shares=(unknowns.focal_share - 1.0, 0.0),
     )
 
 
@@ -66,6 +70,7 @@ def _rounded(
     mount_pitch_deg: float,
     mount_yaw_deg: float,
     tilt: tuple[float, float],
+    shares: tuple[float, float],
 ) -> Known:
     values = {
         "camera_delay_s": camera_delay_s,
@@ -75,5 +80,7 @@ def _rounded(
         "tilt_bias_deg": math.hypot(*tilt),
         "tilt_roll_deg": tilt[0],
         "tilt_pitch_deg": tilt[1],
+        "focal_percent": 100.0 * shares[0],
+        "height_percent": 100.0 * shares[1],
     }
     return {key: None if math.isnan(value) else round(value, 4) for key, value in values.items()}

@@ -22,6 +22,10 @@ SEEN = SensorEstimate(
     tilt_roll_rad=math.radians(-0.3),
     tilt_pitch_rad=math.radians(0.4),
     tilt_sigma_rad=math.radians(0.1),
+    scale_share=0.25,
+    scale_sigma=0.004,
+    height_share=0.1,
+    height_sigma=0.02,
 )
 
 
@@ -40,9 +44,15 @@ def test_what_was_found_stands_beside_what_was_drawn_with_the_same_keys(simulati
         "tilt_bias_deg": 0.5,
         "tilt_roll_deg": 0.3,
         "tilt_pitch_deg": -0.4,
+        "focal_percent": -20.0,
+        "height_percent": 10.0,
     }
     assert told["estimated_sigma"]["camera_delay_s"] == 0.002
     assert told["estimated_sigma"]["tilt_bias_deg"] == 0.1
+    assert (told["estimated_sigma"]["focal_percent"], told["drawn"]["height_percent"]) == (0.4, 0.0)
+    assert told["drawn"]["focal_percent"] == pytest.approx(
+        100.0 * (simulation.unknowns.focal_share - 1.0), abs=1e-4
+    )
     assert list(told["estimated"]) == list(told["estimated_sigma"]) == list(told["drawn"])
 
 
