@@ -9,6 +9,7 @@ import enum
 import hashlib
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from flightd.core.label_values import LabelValue
@@ -53,6 +54,18 @@ class PlannedLocation:
     def __post_init__(self) -> None:
         if self.pallets_deep < 1:
             raise ValueError(f"{self.code}: {self.pallets_deep} pallets deep")
+
+
+class KnownLocations:
+    """The locations of a count by their codes, which are the same whatever their case."""
+
+    def __init__(self, codes: Iterable[str]) -> None:
+        self._codes = frozenset(codes)
+        self._folded = {code.casefold(): code for code in sorted(self._codes)}
+
+    def spelled(self, code: str) -> str:
+        """A code as the count writes it; one that it does not know as it is."""
+        return code if code in self._codes else self._folded.get(code.casefold(), code)
 
 
 @dataclass(frozen=True, slots=True)

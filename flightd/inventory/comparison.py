@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from flightd.core.inventory import LocationRecord, LocationState
+from flightd.core.inventory import KnownLocations, LocationRecord, LocationState
 from flightd.inventory.code_equality import code_key
 
 
@@ -57,7 +57,9 @@ def compare_stock(
 
     known = {record.code: record for record in records}
     wanted: dict[str, frozenset[str]] = {}
-    for location, codes in _at_known_places(expected, known):
+    places_known = KnownLocations(known)
+    for written, codes in expected.items():
+        location = places_known.spelled(written)
         wanted[location] = wanted.get(location, frozenset()) | frozenset(spelled(codes))
     seen = {code: spelled(record.texts) for code, record in known.items()}
     places: defaultdict[str, list[str]] = defaultdict(list)
@@ -81,15 +83,6 @@ def compare_stock(
         if (record.code, text) not in explained
     ]
     return tuple(sorted(lines, key=lambda line: (line.location, line.text)))
-
-
-def _at_known_places(
-    expected: Mapping[str, Sequence[str]], known: Mapping[str, LocationRecord]
-) -> Iterable[tuple[str, Sequence[str]]]:
-    """What is expected, each location as the count writes it."""
-    folded = {code.casefold(): code for code in known}
-    for location, texts in expected.items():
-        yield (location if location in known else folded.get(location.casefold(), location)), texts
 
 
 def _expected_code(

@@ -15,6 +15,8 @@ from flightd.site.site import Site
 from flightd.site.site_file import load_site, site_toml
 
 _LONGEST_RUN = 80
+_HEADING = "# Counts "
+"""How each re-count that was written here begins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +54,8 @@ def write_recount(
     """Write a configuration like `model` whose mission visits the nodes of the doubtful locations; where its
     site is not in the file that it names any more, a site file beside `out`.
 
-    Raises InputError when there is nothing to fly to, or `out` does not stand beside the model's file
-    (paths in it are taken from there).
+    Raises InputError when there is nothing to fly to, `out` does not stand beside the model's file (paths in
+    it are taken from there), or it is anything but a new file or an earlier re-count.
     """
     if model.file is not None and (
         out.resolve().parent != model.file.resolve().parent or out.resolve() == model.file.resolve()
@@ -61,6 +63,7 @@ def write_recount(
         raise InputError(
             f"must be a new file beside {model.file}: paths in it are taken from there", file=out
         )
+    _check_free(out)
     node_of = {record.code: record.node for record in records}
     nodes = tuple(dict.fromkeys(node for code in doubtful if (node := node_of.get(code, ""))))
     without = tuple(code for code in doubtful if not node_of.get(code))
@@ -73,17 +76,33 @@ def write_recount(
             remedy="give the configuration of the site that was counted",
         )
     table = _mission_over(nodes, model.table, records)
-    heading = [f"# Counts {len(doubtful) - len(without)} doubtful locations again:"]
+    heading = [f"{_HEADING}{len(doubtful) - len(without)} doubtful locations again:"]
     heading += [f"# {json.dumps(code)}: {why}" for code, why in doubtful.items() if code not in without]
     try:
         if model.file is None and not _holds(Path(table["mission"]["site"]), model.site):
             site_file = out.with_name(f"{out.stem}-site.toml")
-            site_file.write_text(site_toml(model.site), encoding="utf-8")
+            if not _holds(site_file, model.site):
+                if site_file.exists() and not out.exists():
+                    raise InputError("is there already, and holds another site", file=site_file)
+                site_file.write_text(site_toml(model.site), encoding="utf-8")
             table["mission"]["site"] = site_file.name
         out.write_text("\n".join(heading) + "\n\n" + _toml(table), encoding="utf-8")
     except OSError as err:
         raise cannot_write(out, err) from None
     return RecountMission(nodes, without)
+
+
+def _check_free(out: Path) -> None:
+    """InputError for a file that is no earlier re-count: the books, say, or the flight's own configuration."""
+    if not out.exists():
+        return
+    try:
+        with out.open("rb") as file:
+            ours = file.read(len(_HEADING)) == _HEADING.encode()
+    except OSError as err:
+        raise cannot_write(out, err) from None
+    if not ours:
+        raise InputError("is there already, and no re-count", file=out, remedy="give the name of a new file")
 
 
 def _mission_over(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from flightd.core.errors import InputError
-from flightd.core.inventory import LocationRecord, LocationState
+from flightd.core.inventory import KnownLocations, LocationRecord, LocationState
 from flightd.inventory.comparison import ComparisonOutcome
 
 LOW_CONFIDENCE = "confidence"
@@ -41,11 +41,13 @@ class RecountChoice:
         known = {record.code: record for record in records}
         _check("--aisles", self.aisles, set(aisles.values()))
         _check("--nodes", self.nodes, {record.node for record in records})
-        _check("--locations", self.locations, known)
+        spelled = KnownLocations(known).spelled
+        choice = replace(self, locations=tuple(map(spelled, self.locations)))
+        _check("--locations", choice.locations, known)
         _check("--states", self.states, [state.value for state in LocationState])
         _check("--reasons", self.reasons, REASONS)
         chosen = {
-            code: why for code, why in doubtful.items() if self._fits(code, why, known.get(code), aisles)
+            code: why for code, why in doubtful.items() if choice._fits(code, why, known.get(code), aisles)
         }
         if self.at_most is None:
             return chosen

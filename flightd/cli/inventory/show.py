@@ -43,15 +43,18 @@ def show(
       flightd inventory show out/inventory --location A-03-2-1
     """
     from flightd.adapters.store.for_reading import opened_for_reading
+    from flightd.core.inventory import KnownLocations
 
     with opened_for_reading(folder) as store:
         records = store.locations()
         if location is None:
             _show_records(records, as_json, least_confidence)
             return
-        if all(record.code != location for record in records):
-            raise InputError(f"knows no location {location!r}", file=folder)
-        _show_history(location, store.history(location), as_json, least_confidence)
+        code = KnownLocations(record.code for record in records).spelled(location)
+        if all(record.code != code for record in records):
+            remedy = f"flightd inventory show {folder} lists what it knows"
+            raise InputError(f"knows no location {location!r}", file=folder, remedy=remedy)
+        _show_history(code, store.history(code), as_json, least_confidence)
 
 
 def _show_records(records: Sequence[LocationRecord], as_json: bool, least_confidence: float) -> None:

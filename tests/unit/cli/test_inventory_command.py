@@ -313,6 +313,40 @@ def test_a_recount_of_so_many_begins_with_differences(flown: Path, tmp_path: Pat
     assert told["recount"] == {late: "empty_but_expected"}
 
 
+def test_a_recount_takes_the_place_of_an_earlier_one_and_of_nothing_else(flown: Path, tmp_path: Path) -> None:
+    out, books, log = tmp_path / "recount.toml", flown / "books.csv", flown / "flight.mcap"
+    recounted(flown, out, "--at-most", "1")
+    assert len(recounted(flown, out)[1]) > 1
+    for taken in (books, log):
+        before = taken.read_bytes()
+        said = error_of("compare", flown, books, "--recount", taken)
+        assert said == f"{taken}: is there already, and no re-count; give the name of a new file"
+        assert taken.read_bytes() == before
+    assert "Is a directory" in error_of("compare", flown, books, "--recount", ".")
+
+
+def test_a_recount_takes_the_place_of_no_other_site_file(flown: Path, tmp_path: Path) -> None:
+    site = tmp_path / "again-site.toml"
+    shutil.copy(CONFIGS / "site-large.toml", site)
+    before = site.read_bytes()
+    books = flown / "books.csv"
+    books.write_text("location,code\n")
+    told = load_site(CONFIGS / "site-racks-small.toml")
+    with McapRecorder(flown / "flight.mcap") as recorder:
+        config = load_config(CONFIGS / "sim.toml").with_values(mission={"site": tmp_path / "gone.toml"})
+        record_setting(recorder, 1, FlightSetting(config, told, configured_order(config)))
+    said = error_of("compare", flown, books, "--recount", tmp_path / "again.toml")
+    assert said == f"{site}: is there already, and holds another site"
+    assert site.read_bytes() == before
+    recounted(flown, tmp_path / "other.toml")
+    assert load_site(tmp_path / "other-site.toml") == told
+
+
+def test_a_location_is_asked_for_whatever_its_case(flown: Path, tmp_path: Path) -> None:
+    assert json.loads(run("show", flown, "--location", "al-01-1-1", "--json"))["location"] == "AL-01-1-1"
+    assert list(recounted(flown, tmp_path / "r.toml", "--locations", "al-01-1-1")[0]) == ["AL-01-1-1"]
+
+
 @pytest.mark.parametrize(
     ("option", "name"),
     [
