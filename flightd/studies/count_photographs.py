@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from flightd.core.inventory import LocationRecord, LocationState, Observation
-from flightd.core.types import Image
+from flightd.core.inventory import KnownLocations, LocationRecord, LocationState, Observation
+from flightd.core.types import CodeRead
 from flightd.ports import Store
 from flightd.studies.frame_files import read_image
 from flightd.studies.progress_bar import track
@@ -17,18 +17,23 @@ from flightd.vision.shelf.evidence_jpeg import evidence_jpeg
 def count_photographs(store: Store, files: Sequence[Path], run: str) -> list[LocationRecord]:
     """Count the pictures into `store` as the count `run`; returns the locations that they show.
 
-    InputError for a picture that cannot be read; those before it are counted then.
+    A label that says the code of a known location is no stock.  InputError for a picture that cannot be
+    read; those before it are counted then.
     """
+    codes = {record.code for record in store.locations()}
+    known = KnownLocations(codes)
     for file in track(files, "counting"):
         picture = read_image(file)
+        reads = tuple(
+            read for read in read_codes(picture) if read.believed and known.spelled(read.text) not in codes
+        )
         evidence = store.keep_evidence(evidence_jpeg(picture))
-        store.commit(_look(file.stem, picture, file.stat().st_mtime_ns, run, evidence))
-    seen = {file.stem for file in files}
+        store.commit(_look(known.spelled(file.stem), reads, file.stat().st_mtime_ns, run, evidence))
+    seen = {known.spelled(file.stem) for file in files}
     return [record for record in store.locations() if record.code in seen]
 
 
-def _look(location: str, picture: Image, utc_ns: int, run: str, evidence: str) -> Observation:
-    reads = tuple(read for read in read_codes(picture) if read.believed)
+def _look(location: str, reads: tuple[CodeRead, ...], utc_ns: int, run: str, evidence: str) -> Observation:
     texts = {read.text for read in reads}
     if not texts:
         return Observation(run, location, utc_ns, LocationState.UNREADABLE, 0.0, evidence=evidence)

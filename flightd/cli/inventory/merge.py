@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -31,11 +32,11 @@ def merge(
     from flightd.adapters.store.for_reading import opened_for_reading
     from flightd.adapters.store.sqlite import SqliteStore
 
-    taken = 0
-    with SqliteStore(folder) as store:
-        for other in others:
-            with opened_for_reading(other) as source:
-                taken += store.merge(source)
+    with ExitStack() as opened:
+        # all of them first: a folder that holds none makes no inventory and takes in no part of them
+        sources = [opened.enter_context(opened_for_reading(other)) for other in others]
+        store = opened.enter_context(SqliteStore(folder))
+        taken = sum(map(store.merge, sources))
         records = store.locations()
     if as_json:
         print(json.dumps({"new_observations": taken, "locations": len(records)}))

@@ -74,6 +74,19 @@ def test_photographs_become_an_inventory_and_again_change_nothing(tmp_path: Path
     assert "3 locations: 1 read, 1 several, 1 unreadable" in run("show", store)
 
 
+def test_a_photograph_is_of_the_planned_place_whatever_its_case_and_location_labels_are_no_stock(
+    tmp_path: Path,
+) -> None:
+    store, folder = tmp_path / "store", tmp_path / "photographs"
+    folder.mkdir()
+    with SqliteStore(store) as planned:
+        planned.plan([PlannedLocation("AL-01", "A1"), PlannedLocation("AL-02", "A1")])
+    photograph(folder / "al-01.png", ("PALLET-1", QR), ("AL-01", QR))
+    photograph(folder / "AL-02.png", ("AL-01", QR))
+    assert json.loads(run("add", store, folder, "--json")) == {"AL-01": "read", "AL-02": "unreadable"}
+    assert "2 locations" in run("show", store)
+
+
 def test_what_is_known_of_the_goods_stands_beside_the_codes(tmp_path: Path) -> None:
     gs1 = code("x", "Data Matrix", a01="09501101530003", a10="L1", a17="261130")
     with SqliteStore(tmp_path) as store:
@@ -163,6 +176,18 @@ def test_stores_merge(counted: Path, tmp_path: Path, photographs: Path) -> None:
     run("add", other, photographs)
     assert json.loads(run("merge", counted, other, "--json"))["new_observations"] == 3
     assert json.loads(run("merge", counted, other, "--json"))["new_observations"] == 0
+
+
+def test_a_merge_of_what_is_no_inventory_changes_nothing(
+    counted: Path, tmp_path: Path, photographs: Path
+) -> None:
+    other, new = tmp_path / "other", tmp_path / "new"
+    run("add", other, photographs)
+    before = run("show", counted, "--json")
+    assert "holds no inventory.db" in error_of("merge", counted, other, tmp_path)
+    assert run("show", counted, "--json") == before
+    assert "holds no inventory.db" in error_of("merge", new, tmp_path)
+    assert not new.exists()
 
 
 @pytest.mark.parametrize(
