@@ -93,7 +93,7 @@ def write_recount(
 
 
 def _check_free(out: Path) -> None:
-    """InputError for a file that is no earlier re-count: the books, say, or the flight's own configuration."""
+    """InputError for a file that is no earlier re-count: the books, say, or the flight's configuration."""
     if not out.exists():
         return
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from flightd.core.errors import InputError
 from flightd.core.inventory import KnownLocations, LocationRecord, LocationState
@@ -41,13 +41,15 @@ class RecountChoice:
         known = {record.code: record for record in records}
         _check("--aisles", self.aisles, set(aisles.values()))
         _check("--nodes", self.nodes, {record.node for record in records})
-        spelled = KnownLocations(known).spelled
-        choice = replace(self, locations=tuple(map(spelled, self.locations)))
-        _check("--locations", choice.locations, known)
+        locations = frozenset(map(KnownLocations(known).spelled, self.locations))
+        _check("--locations", sorted(locations), known)
         _check("--states", self.states, [state.value for state in LocationState])
         _check("--reasons", self.reasons, REASONS)
         chosen = {
-            code: why for code, why in doubtful.items() if choice._fits(code, why, known.get(code), aisles)
+            code: why
+            for code, why in doubtful.items()
+            if not locations or code in locations
+            if self._fits(why, known.get(code), aisles)
         }
         if self.at_most is None:
             return chosen
@@ -55,13 +57,12 @@ class RecountChoice:
         kept = set(by_urgency[: self.at_most])
         return {code: why for code, why in chosen.items() if code in kept}
 
-    def _fits(self, code: str, why: str, record: LocationRecord | None, aisles: Mapping[str, str]) -> bool:
+    def _fits(self, why: str, record: LocationRecord | None, aisles: Mapping[str, str]) -> bool:
         node = record.node if record else ""
         state = record.state.value if record else ""
         tests = (
             (self.aisles, aisles.get(node, "")),
             (self.nodes, node),
-            (self.locations, code),
             (self.states, state),
             (self.reasons, _kind(why)),
         )
