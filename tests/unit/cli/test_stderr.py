@@ -13,6 +13,9 @@ import cv2
 import numpy as np
 import pytest
 
+from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.inventory import PlannedLocation
+
 ROOT = Path(__file__).parents[3]
 
 
@@ -46,6 +49,29 @@ def video(tmp_path_factory: pytest.TempPathFactory) -> Path:
         writer.write(np.zeros((360, 640, 3), np.uint8))
     writer.release()
     return path
+
+
+@pytest.mark.parametrize("buffered", ["", "1"])
+@pytest.mark.parametrize("arguments", [("guide", "counting"), ("guide", "--json"), ("log", "--help")])
+def test_an_output_that_takes_no_more_is_one_line(arguments: tuple[str, ...], buffered: str) -> None:
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "flightd", *arguments],
+            cwd=ROOT, env={**os.environ, "PYTHONUNBUFFERED": buffered},
+            stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False,
+        )  # fmt: skip
+    assert (done.returncode, done.stderr) == (2, "flightd: output: cannot write: No space left on device\n")
+
+
+@pytest.mark.parametrize(("closed", "code"), [(">&-", 0), ("2>&-", 0), (">&- 2>&-", 0), ("| true", 1)])
+def test_an_output_that_nobody_reads_is_no_failure_to_tell(closed: str, code: int, tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as store:
+        store.plan([PlannedLocation("A-01", "A1")])
+    command = f"{sys.executable} -m flightd inventory export {tmp_path} {closed}; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (code, "")
 
 
 def test_a_video_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
