@@ -43,5 +43,8 @@ def plan(
 
     settings = load_config(config)
     mission = pilot_of(settings, load_site(settings.mission.site)).mission
-    planned = mission.planned(nodes or (), level or (), best_order=best)
+    chosen = nodes or ()
+    if not nodes and (level or best):
+        chosen = mission.planned((), (), best_order=False).nodes
+    planned = mission.planned(chosen, level or (), best_order=best)
     print(json.dumps(asdict(planned)) if as_json else "\n".join(planned_in_words(planned)))

@@ -46,7 +46,7 @@ class LabelTextConfig(Section):
     def _fits(self) -> Self:
         try:
             groups = re.compile(self.pattern).groups
-        except re.error as err:
+        except (re.error, OverflowError, RecursionError) as err:
             raise ValueError(f"pattern: no regular expression: {err}") from None
         if groups != 1:
             raise ValueError(

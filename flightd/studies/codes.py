@@ -72,7 +72,7 @@ def read_expected(path: Path) -> Expected:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as err:
         raise InputError(f"cannot read the labels: {err.strerror or err}", file=path) from None
-    except ValueError as err:
+    except (ValueError, RecursionError) as err:
         raise InputError(f"not JSON: {err}", file=path) from None
     entries = document.get("codes") if isinstance(document, dict) else None
     if not isinstance(entries, list):

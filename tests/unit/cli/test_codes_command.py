@@ -72,6 +72,7 @@ def test_labels_give_a_verdict(folder: Path) -> None:
     ("text", "words"),
     [
         ("{", "not JSON"),
+        ("[" * 100_000, "not JSON"),
         ("[]", 'no list "codes"'),
         ('{"codes": [{"file": "a.png"}]}', "codes[0]"),
         ('{"codes": [{"file": "z.png", "text": "x"}]}', "z.png"),

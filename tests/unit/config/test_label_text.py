@@ -25,6 +25,7 @@ def test_patterns_are_read() -> None:
     ("text", "words"),
     [
         ({"kind": "lot", "pattern": "LOT ("}, "no regular expression"),
+        ({"kind": "lot", "pattern": "(a{99999999999})"}, "no regular expression"),
         ({"kind": "lot", "pattern": "LOT"}, "has 0 groups; put the value alone in parentheses"),
         ({"kind": "lot", "pattern": "(L)(O)"}, "has 2 groups"),
         ({"kind": "expiry", "pattern": "(.*)"}, 'kind = "expiry" needs dates'),
