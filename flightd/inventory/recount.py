@@ -11,6 +11,7 @@ from typing import Any
 from flightd.config.schema import Config, load_table, parse_config
 from flightd.core.errors import InputError, cannot_write
 from flightd.core.inventory import LocationRecord
+from flightd.core.replaced_output import check_replaceable
 from flightd.site.site import Site
 from flightd.site.site_file import load_site, site_toml
 
@@ -63,7 +64,7 @@ def write_recount(
         raise InputError(
             f"must be a new file beside {model.file}: paths in it are taken from there", file=out
         )
-    _check_free(out)
+    check_replaceable(out, _HEADING, "re-count")
     node_of = {record.code: record.node for record in records}
     nodes = tuple(dict.fromkeys(node for code in doubtful if (node := node_of.get(code, ""))))
     without = tuple(code for code in doubtful if not node_of.get(code))
@@ -90,19 +91,6 @@ def write_recount(
     except OSError as err:
         raise cannot_write(out, err) from None
     return RecountMission(nodes, without)
-
-
-def _check_free(out: Path) -> None:
-    """InputError for a file that is no earlier re-count: the books, say, or the flight's configuration."""
-    if not out.exists():
-        return
-    try:
-        with out.open("rb") as file:
-            ours = file.read(len(_HEADING)) == _HEADING.encode()
-    except OSError as err:
-        raise cannot_write(out, err) from None
-    if not ours:
-        raise InputError("is there already, and no re-count", file=out, remedy="give the name of a new file")
 
 
 def _mission_over(

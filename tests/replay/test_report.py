@@ -297,6 +297,17 @@ def test_a_page_that_cannot_be_written_is_told(tmp_path: Path) -> None:
         write_report(tmp_path / "flight.mcap", tmp_path / "file" / "report.html")
 
 
+def test_a_report_takes_the_place_of_an_earlier_one_and_of_nothing_else(tmp_path: Path) -> None:
+    log = write_flight(tmp_path)
+    before, page = log.read_bytes(), tmp_path / "report.html"
+    with pytest.raises(InputError, match="is there already, and no report; give the name of a new file"):
+        write_report(log, log)
+    assert log.read_bytes() == before
+    write_report(log, page)
+    write_report(log, page)
+    assert page.read_text().startswith("<!doctype html>")
+
+
 def test_the_command_writes_the_page_and_tells_where(flightd: Command, tmp_path: Path) -> None:
     McapRecorder(tmp_path / "flight.mcap").close()
     result = flightd("report", tmp_path / "flight.mcap", "--json")

@@ -11,6 +11,7 @@ from string import Template
 
 from flightd import __version__
 from flightd.core.errors import UnavailableError
+from flightd.core.replaced_output import check_replaceable
 from flightd.replay.report.charts import strips, timeline
 from flightd.replay.report.figures import Figure, flight_time_s, key_figures, outcome
 from flightd.replay.report.flight import RecordedFlight
@@ -32,7 +33,9 @@ def write_report(log: Path, out: Path, count: CountedStock | None = None) -> Non
     """Write the report of `log` to `out`, with `truth.mcap` and `summary.json` if they lie beside it, and
     with what was counted.
 
-    Raises InputError for a log that cannot be read, UnavailableError if `out` cannot be written."""
+    Raises InputError for a log that cannot be read and for an `out` that is there and no HTML page,
+    UnavailableError if it cannot be written."""
+    check_replaceable(out, "<!doctype html>", "report")
     page = render(load_flight(log), count)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
