@@ -17,6 +17,7 @@ from flightd.studies.overlay import draw
 from flightd.studies.progress_bar import track
 from flightd.vision.jpeg import decoded_jpeg
 
+_ENDINGS = frozenset((".mp4", ".m4v", ".mov", ".avi", ".mkv"))
 _FASTEST_FPS = 60.0
 _LONGEST_STILL = 300
 """A picture stands for at most this many frames of the video where others are missing."""
@@ -25,9 +26,11 @@ _LONGEST_STILL = 300
 def export_video(log: Path, video: Path) -> int:
     """Write the recorded pictures of `log` to an MP4 file, in the time in which they were taken.
 
-    Returns the number of pictures.  InputError if there are none, UnavailableError if the file cannot
-    be written.
+    Returns the number of pictures.  InputError if there are none or the file has no video's name (nothing
+    of that name is touched then), UnavailableError if it cannot be written.
     """
+    if video.suffix.casefold() not in _ENDINGS:
+        raise InputError("is no name of a video", file=video, remedy="name it .mp4")
     stamps_ns = sorted(entry.stamp_ns for entry in LogReader(log).entries({Topic.FRAME}))
     if not stamps_ns:
         raise InputError("holds no pictures", file=log, remedy="record some or export without --video")

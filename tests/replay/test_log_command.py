@@ -76,6 +76,7 @@ def test_a_log_that_was_cut_off_is_repaired(flightd: Command, log: Path, tmp_pat
         (("info", "none.mcap"), "none.mcap: cannot open"),
         (("export", "flight.mcap"), "--csv DIR"),
         (("export", "flight.mcap", "--video", "x.mp4"), "holds no pictures"),
+        (("export", "flight.mcap", "--video", "flight.mcap"), "is no name of a video; name it .mp4"),
         (("export", "flight.mcap", "--csv", "flight.mcap/tables"), "cannot export"),
         (("repair", "note.txt"), "not a flight log"),
     ],
