@@ -78,7 +78,7 @@ def _print_runs(found: Kpis) -> None:
 def _print_rates(what: str, rates: Mapping[str, ReadRate]) -> None:
     for name, rate in rates.items():
         share = "nothing looked at again" if rate.share is None else f"{rate.share:.1%} of {rate.looks} looks"
-        print(f"read again, {what} {visible(name):<16} {share}, {rate.codes} codes")
+        print(f"read again, {f'{what} {visible(name)}':<26} {share}, {rate.codes} codes")
 
 
 def _print_ages(found: Kpis) -> None:

@@ -41,6 +41,7 @@ def _known(record: LocationRecord, least_confidence: float) -> Iterator[str]:
     are known."""
     from flightd.core.inventory import LocationState
     from flightd.inventory.place_values import place_values
+    from flightd.replay.report.stock import fill_text
 
     seen = record.observation
     yield from undecided_words(seen)
@@ -49,7 +50,7 @@ def _known(record: LocationRecord, least_confidence: float) -> Iterator[str]:
             yield f"{stands.kind} {visible(stands.known.text)}"
     fill = seen.fill if seen else None
     if fill and fill.share is not None and record.state is not LocationState.EMPTY:
-        yield f"fill {100.0 * fill.share:.0f} %"
+        yield f"fill {fill_text(fill)}"
     if fill and (cases := fill.cases):
         yield f"cases {cases.columns} x {cases.rows}"
     if record.pallets_deep > 1:
@@ -59,4 +60,5 @@ def _known(record: LocationRecord, least_confidence: float) -> Iterator[str]:
 def states_line(records: Sequence[LocationRecord]) -> str:
     """How many locations there are, and in which states."""
     states = Counter(record.state.value for record in records)
-    return f"{len(records)} locations: " + ", ".join(f"{n} {state}" for state, n in states.most_common())
+    told = ", ".join(f"{n} {state}" for state, n in states.most_common())
+    return f"{len(records)} locations: {told}" if told else "no locations"

@@ -34,8 +34,9 @@ def show(
 ) -> None:
     """Show the state of every location, or the history of one.
 
-    Beside the codes stand what was read there and stayed undecided, and lot, expiry, fill and cases, where
-    they are known. With --json each has all that its labels tell: dates, quantity, weights.
+    Beside the codes stand what was read there and stayed undecided, and lot, expiry, fill with overhang and
+    lean, and cases, where they are known. With --json each has all that its labels tell: dates, quantity,
+    weights.
 
     \b
     Examples:

@@ -91,11 +91,12 @@ def test_what_is_known_of_the_goods_stands_beside_the_codes(tmp_path: Path) -> N
     gs1 = code("x", "Data Matrix", a01="09501101530003", a10="L1", a17="261130")
     with SqliteStore(tmp_path) as store:
         store.plan([PlannedLocation("A-01", "A1", 2), PlannedLocation("A-02", "A1")])
-        fill = PlaceFill(0.62, cases=CaseGrid(4, 3))
+        fill = PlaceFill(0.62, 0.04, 0.03, CaseGrid(4, 3))
         store.commit(replace(look("A-01", 1, gs1), fill=fill))
         store.commit(replace(look("A-02", 2, state="empty"), fill=PlaceFill(0.0)))
     lines = run("show", tmp_path).splitlines()
-    known = "lot L1  expiry 2026-11-30  fill 62 %  cases 4 x 3  1 of 2 pallets seen"
+    known = "lot L1  expiry 2026-11-30  fill 62 %, 4 cm over the rack's face, leans by 3 cm  cases 4 x 3"
+    known += "  1 of 2 pallets seen"
     assert lines[:2] == [f"A-01             read         x  {known}", "A-02             empty"]
 
 
