@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,15 @@ import segno
 from mcap.writer import Writer
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.inventory import CountPose, LocationState, Observation, PlaceFill, PlannedLocation
+from flightd.core.inventory import (
+    CaseGrid,
+    CountPose,
+    LocationState,
+    Observation,
+    PlaceFill,
+    PlannedLocation,
+    UndecidedCode,
+)
 from flightd.core.topics import Topic
 from flightd.core.types import CodeRead
 from flightd.site.site import Site
@@ -69,10 +78,11 @@ def counted_store(folder: Path) -> None:
         kept = store.keep_evidence(picture_of(f"00{SSCC}"))
         store.commit(look("AL-01-1-1", LocationState.UNREADABLE, run="2026-W46", at_s=-604_800))
         store.commit(look("AL-01-1-1", LocationState.READ, code(f"00{SSCC}", ("00", SSCC)), evidence=kept))
-        filled = PlaceFill(0.625, 0.04, 0.03)
+        filled = PlaceFill(0.625, 0.04, 0.03, CaseGrid(4, 3))
         store.commit(look("AL-01-2-1", LocationState.READ, code("4006381333931"), fill=filled))
         store.commit(look("AL-02-1-1", LocationState.EMPTY))
-        store.commit(look("AL-02-2-1", LocationState.UNREADABLE, fill=PlaceFill(None)))
+        unread = look("AL-02-2-1", LocationState.UNREADABLE, fill=PlaceFill(None))
+        store.commit(replace(unread, undecided=(UndecidedCode("ITF", "070429", 1),)))
         store.commit(look("AL-03-1-1", LocationState.OCCLUDED))
         store.commit(look("AL-03-2-1", LocationState.SEVERAL, code("PAL-7/L1"), code("PAL-8/L1")))
         store.commit(look("AL-04-1-1", LocationState.READ, code("PAL-9/L1")), confirmed=False)

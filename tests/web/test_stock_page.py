@@ -95,8 +95,8 @@ def test_a_click_shows_picture_outline_code_and_history(browser: Browser, unchan
 def test_a_place_says_how_full_it_is_or_that_nobody_knows(browser: Browser, unchanged: str) -> None:
     with opened(browser, unchanged) as page:
         for place, told in {
-            "AL-01-2-1": ["Filled63 %", "Overhang0.04 m", "Leans by0.03 m", "Confidence98 %"],
-            "AL-02-2-1": ["Filledunknown", "Confidence98 %"],
+            "AL-01-2-1": ["Filled63 %", "Overhang0.04 m", "Leans by0.03 m", "Cases4 x 3", "Confidence98 %"],
+            "AL-02-2-1": ["Filledunknown", "Undecided070429", "Confidence98 %"],
             "AL-01-1-1": ["Confidence98 %"],
         }.items():
             cell(page, place).click()

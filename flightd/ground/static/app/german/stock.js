@@ -91,6 +91,8 @@ export default {
   "Filled": "Gefüllt",
   "unknown": "unbekannt",
   "Overhang": "Überstand",
+  "Cases": "Kartons",
+  "Undecided": "Unentschieden",
   "Leans by": "Neigt sich um",
   "Confidence": "Sicherheit",
   "Looked at": "Angesehen",

@@ -42,8 +42,8 @@ export function standing(code, { decisions, places }) {
 export const needsALook = (code, { places, expected }) =>
   NEEDS_A_LOOK.has(places[code]?.state) || differs(code, expected);
 
-// The places that need a look or were ordered to be counted again: {code, decision, open}, in the order in which
-// one walks along them.
+// The places that need a look or were ordered to be counted again: {code, decision, open}, as one
+// walks along them.
 export function exceptions(known) {
   return inOrder(known.fronts)
     .filter((code) => needsALook(code, known) || standing(code, known)?.what === "count_again")

@@ -1,4 +1,4 @@
-// The places that need a look as a queue: what is the matter, who looks, what was decided.
+// The places that need a look, as a queue: why, who looks, what was decided.
 import { mayOperate } from "../access/session.js";
 import { html, useMemo } from "../html.js";
 import { say } from "../language.js";

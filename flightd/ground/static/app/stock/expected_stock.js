@@ -1,5 +1,4 @@
-// The books that a viewer uploads: sent to the station with the columns chosen, compared there, kept in this tab.
-// What is kept for everybody is in kept_stock.js.
+// The books that a viewer uploads: compared by the station, kept in this tab alone.
 import { mayOperate } from "../access/session.js";
 import { isGivenUp } from "../fetching.js";
 import { chooseKept, columnsQuery, downloadKept, keep, loadKept, removeKept, showNone } from "./kept_stock.js";

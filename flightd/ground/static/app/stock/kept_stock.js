@@ -1,4 +1,4 @@
-// The expected stock that the station keeps of an inventory, for everybody: loaded, sent, changed, removed.
+// The expected stock that the station keeps of an inventory for everybody.
 import { isGivenUp } from "../fetching.js";
 import { who } from "./decisions.js";
 import { asked } from "./stock_source.js";

@@ -1,4 +1,4 @@
-// One place: its picture with the codes' outlines, what was read, how sure, and its history over the runs.
+// One place: its picture with the codes' outlines, what is known of it, and its history.
 import { mayOperate } from "../access/session.js";
 import { html, useEffect, useState } from "../html.js";
 import { decimal, english, quoted, say } from "../language.js";
@@ -126,11 +126,13 @@ function Facts({ look }) {
     [say("Filled"), fill && (fill.share === null ? say("unknown") : `${decimal(100 * fill.share)} %`)],
     [say("Overhang"), fill?.overhang_m && `${decimal(fill.overhang_m, 2)} m`],
     [say("Leans by"), fill?.share > 0 && (fill.lean_m === null ? say("unknown") : `${decimal(fill.lean_m, 2)} m`)],
+    [say("Cases"), fill?.cases && `${fill.cases.columns} x ${fill.cases.rows}`],
+    [say("Undecided"), look.undecided?.map(({ text }) => visible(text)).join(", ")],
     [say("Confidence"), `${Math.floor(look.confidence * 100)} %`],
     [say("Looked at"), when(look.utc)],
     [say("Run"), look.run],
     [say("From"), pose && say("node {node}, {height} m", { node: pose.node, height: decimal(pose.height_m, 2) })],
-    [say("Standing"), look.standing && STANDINGS[look.standing] && say(STANDINGS[look.standing])],
+    [say("Standing"), STANDINGS[look.standing] && say(STANDINGS[look.standing])],
   ];
   return html`
     <div class="facts">
