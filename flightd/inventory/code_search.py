@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from flightd.inventory.code_equality import code_key
 from flightd.inventory.place_view import PlaceView
+from flightd.vision.shelf.code_equality import code_key
 
 
 def found_places(words: str, places: Iterable[PlaceView]) -> list[str]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from flightd.core.inventory import KnownLocations, LocationRecord, LocationState
-from flightd.inventory.code_equality import code_key
+from flightd.vision.shelf.code_equality import code_key
 
 
 class ComparisonOutcome(enum.StrEnum):

@@ -6,7 +6,7 @@ import enum
 from collections.abc import Collection
 
 from flightd.core.inventory import LocationState
-from flightd.inventory.code_equality import code_key
+from flightd.vision.shelf.code_equality import code_key
 
 
 class CountChange(enum.StrEnum):

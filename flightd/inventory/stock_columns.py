@@ -8,8 +8,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from flightd.core.errors import InputError
-from flightd.inventory.code_equality import code_key
 from flightd.inventory.stock_table import StockTable
+from flightd.vision.shelf.code_equality import code_key
 
 _PLACE_WORDS = (
     "location", "loc", "place", "bin", "slot", "storagebin", "storagelocation", "shelf", "cell", "address",

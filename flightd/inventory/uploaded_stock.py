@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from flightd.inventory.code_equality import code_key
 from flightd.inventory.stock_columns import StockColumns
 from flightd.inventory.stock_table import StockTable, is_rounded
+from flightd.vision.shelf.code_equality import code_key
 
 _ZERO = re.compile(r"[0.,' ]*0[0.,' ]*")
 _NUMBER = re.compile(r"[\d.,' ]*\d[\d.,' ]*")

@@ -14,7 +14,7 @@ import msgspec
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import LocationRecord, LocationState, Observation
 from flightd.core.types import CodeRead
-from flightd.inventory.code_equality import code_key
+from flightd.vision.shelf.code_equality import code_key
 from tools.odoo.connector_file import CountsSection
 from tools.odoo.json_service import JsonService, Refusal, checked_url
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from flightd.inventory.code_equality import code_key
+from flightd.vision.shelf.code_equality import code_key
 from tools.odoo.odoo import Domain, Odoo, Record
 from tools.odoo.plan import Made
 from tools.odoo.stock import Location, Named, Product, barcodes_of

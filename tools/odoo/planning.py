@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from flightd.core.errors import InputError
-from flightd.inventory.code_equality import code_key
 from flightd.inventory.comparison import ComparisonOutcome, Difference, compare_stock
+from flightd.vision.shelf.code_equality import code_key
 from tools.odoo.connector_file import ConnectorFile
 from tools.odoo.counts import Counted, Station, StationCounts
 from tools.odoo.found_labels import made_of

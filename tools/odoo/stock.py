@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flightd.core.errors import InputError
-from flightd.inventory.code_equality import code_key
+from flightd.vision.shelf.code_equality import code_key
 from tools.odoo.connector_file import Naming, OdooSection
 from tools.odoo.odoo import PAGE, Domain, Odoo, Record
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from flightd.ground.ground_store.engine import Row, Session
-from flightd.inventory.code_equality import code_key
+from flightd.vision.shelf.code_equality import code_key
 
 MOST_PLACES = 20_000
 """Of one file."""

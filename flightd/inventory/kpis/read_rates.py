@@ -14,8 +14,8 @@ from typing import Final
 
 from flightd.core.inventory import LocationState, Observation, Standing
 from flightd.core.types import CodeRead
-from flightd.inventory.code_equality import code_key
 from flightd.inventory.place_view import Look
+from flightd.vision.shelf.code_equality import code_key
 
 MODULE_BOUNDS_PX: Final = (2.0, 2.75, 4.0, 6.0)
 """Between the classes of module size."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flightd.core.inventory import Observation
-from flightd.inventory.code_equality import code_key
+from flightd.vision.shelf.code_equality import code_key
 
 
 class ChangeKind(enum.StrEnum):

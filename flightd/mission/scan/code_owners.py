@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from flightd.core.scanning import CountedPlace, Finding
 from flightd.core.types import CodeRead
 from flightd.mission.scan.code_identity import names_one_thing
+from flightd.vision.shelf.code_equality import code_key
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +44,9 @@ class CodeOwners:
     def book(self, counted: Iterable[CountedPlace]) -> None:
         """Earlier flights have counted these.  What they booked at two places surely hangs at both."""
         for place in counted:
-            for text in _things(place.reads):
-                self._places.setdefault(text, set()).add(place.location)
-        self._at_many |= {text for text, at in self._places.items() if len(at) > 1}
+            for thing in _things(place.reads):
+                self._places.setdefault(thing, set()).add(place.location)
+        self._at_many |= {thing for thing, at in self._places.items() if len(at) > 1}
 
     def begin(self) -> None:
         """Another flight of the count looks at all places anew, at each once more where it has to."""
@@ -54,17 +55,17 @@ class CodeOwners:
     def take(self, found: Finding) -> Contradiction | None:
         """What contradicts the finding, which is the place's own unless it is to be looked at again; what was
         found there before is over."""
-        # a text that hangs at two places surely names no single thing
-        texts = _things(found.reads) - self._at_many
+        # what hangs at two places surely is no single thing
+        things = _things(found.reads) - self._at_many
         self._drop({found.location})
-        twice = {text for text in texts if self._places.get(text, set()) - {found.location}}
-        others = {place for text in twice for place in self._places[text]} - {found.location}
+        twice = {thing for thing in things if self._places.get(thing, set()) - {found.location}}
+        others = {place for thing in twice for place in self._places[thing]} - {found.location}
         again = ({found.location} | others) - self._again if others else set()
         self._again |= again
         self._drop(again)
         if found.location not in again:
-            for text in texts:
-                self._places.setdefault(text, set()).add(found.location)
+            for thing in things:
+                self._places.setdefault(thing, set()).add(found.location)
         if not others:
             return None
         if not again:
@@ -78,8 +79,9 @@ class CodeOwners:
         self._drop(gone)
 
     def _drop(self, places: set[str]) -> None:
-        self._places = {text: left for text, at in self._places.items() if (left := at - places)}
+        self._places = {thing: left for thing, at in self._places.items() if (left := at - places)}
 
 
 def _things(reads: Iterable[CodeRead]) -> set[str]:
-    return {read.text for read in reads if names_one_thing(read)}
+    """What the codes name, whatever else their labels say of it and however it is written."""
+    return {code_key(read.text) for read in reads if names_one_thing(read)}

@@ -31,6 +31,19 @@ def test_both_are_looked_at_again_and_what_hangs_at_both_is_asked_about_no_more(
     assert (other[1].others, other[1].again) == (("D",), frozenset({"D", "E"})), "and by another code it is"
 
 
+def test_one_thing_is_at_two_places_however_its_labels_write_it_and_whatever_else_they_say() -> None:
+    owners = CodeOwners()
+    assert owners.take(found("A", "00340123450002439853")) is None
+    content = owners.take(found("B", "003401234500024398530204006381333931375"))
+    assert content is not None
+    assert content.others == ("A",)
+    assert owners.take(found("C", "PAL-7/L1")) is None
+    assert owners.take(found("D", "pal-7/l1")) is not None
+    assert owners.take(found("E", "003401234500024398461")) is None, (
+        "no SSCC of nearly its digits"
+    )
+
+
 def test_a_place_that_is_taken_back_is_due_however_often_its_node_was() -> None:
     pending = PendingFindings(confirm_stops=2, revisits=0)
     for place in ("one", "two", "three"):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.inventory.code_equality import code_key, same_code
+from flightd.vision.shelf.code_equality import code_key, same_code
 from flightd.vision.shelf.gs1 import FNC1, check_digit
 
 SSCC = "340123450002439853"
