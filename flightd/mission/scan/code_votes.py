@@ -68,10 +68,6 @@ class CodeVotes:
             (placed, len(self._looks[placed.read.symbology, placed.read.text])) for placed in self._counted()
         )
 
-    def in_doubt(self) -> tuple[SeenRead, ...]:
-        """One read for each code that is not believed."""
-        return tuple(seen for seen in self.seen() if not seen[0].read.believed)
-
     def _counted(self) -> Iterator[PlacedRead]:
         """The best read of each code, `agreeing` as in `believed`."""
         for code, placed in self._codes.items():

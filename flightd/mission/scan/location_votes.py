@@ -160,12 +160,12 @@ class LocationVotes:
     def _undecided(
         self, believed: Sequence[PlacedRead], others: Collection[str]
     ) -> tuple[UndecidedCode, ...]:
-        """What was read beside the codes that count and is not believed, the most often seen first: no
-        misread or part of one of these, nor of the location's own label.  Where none counts, what was sure in
-        passing: of a label that cannot be read much is misread."""
+        """What was read beside the codes that count, the most often seen first: no misread or part of one of
+        these, nor of the location's own label.  Where none counts, what one label was surely read as, here or
+        in passing: of one that cannot be read much is misread."""
         own = self._location, *(placed.read.text for placed in believed)
         looks: Counter[tuple[str, str]] = Counter()
-        for doubtful, times in (*self._votes.in_doubt(), *self._passed):
+        for doubtful, times in (*self._votes.seen(), *self._passed):
             text = doubtful.read.text
             known = text in others or any(text in whole for whole in own)
             known = known or not (believed or doubtful.read.believed)

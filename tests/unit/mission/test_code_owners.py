@@ -39,9 +39,7 @@ def test_one_thing_is_at_two_places_however_its_labels_write_it_and_whatever_els
     assert content.others == ("A",)
     assert owners.take(found("C", "PAL-7/L1")) is None
     assert owners.take(found("D", "pal-7/l1")) is not None
-    assert owners.take(found("E", "003401234500024398461")) is None, (
-        "no SSCC of nearly its digits"
-    )
+    assert owners.take(found("E", "003401234500024398461")) is None, "no SSCC of nearly its digits"
 
 
 def test_a_place_that_is_taken_back_is_due_however_often_its_node_was() -> None:

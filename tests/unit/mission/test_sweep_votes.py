@@ -159,6 +159,7 @@ def test_two_codes_are_two_labels_only_where_a_view_shows_both() -> None:
 def test_one_label_read_differently_decides_nothing() -> None:
     one, two = [placed("P1")], [placed("P2")]
     assert verdict([one, one, two, two, (), ()]) is Undecided.TORN
+    assert stopped([one, one, one, two, two, ()]) == ("unreadable", [], [("P1", 3), ("P2", 2)])
 
 
 def test_half_a_code_at_the_pictures_edge_does_not_make_another_of_its_label() -> None:
