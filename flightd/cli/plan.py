@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Annotated
 
@@ -43,7 +44,7 @@ def plan(
 
     settings = load_config(config)
     mission = pilot_of(settings, load_site(settings.mission.site)).mission
-    chosen = nodes or ()
+    chosen: Sequence[str] = nodes or ()
     if not nodes and (level or best):
         chosen = mission.planned((), (), best_order=False).nodes
     planned = mission.planned(chosen, level or (), best_order=best)
