@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flightd.ground.decision_book import station_file
+from flightd.ground.drop import Drop
 from flightd.inventory.stock_columns import StockColumns
 
 MOST_UPLOADS = 20
@@ -47,17 +48,6 @@ class ExpectedStock:
     utc_ns: int
     changed_ns: int
     columns: StockColumns
-
-
-@dataclass(frozen=True, slots=True)
-class Drop:
-    """The newest file of an `inbox` whose content is kept, and which may lie there still, by `name` and
-    `sha256`; `said` is what whoever dropped it is told."""
-
-    inbox: str
-    name: str
-    sha256: str
-    said: str
 
 
 class ExpectedStockBook:

@@ -59,7 +59,7 @@ class StockTable:
 
 def read_table(data: bytes, needed: str = "one of places and one of codes are needed") -> StockTable:
     """The table in a file.  InputError saying what is wrong with it and what to do; `needed` are the columns
-    without which it is none, in words."""
+    without which it is none, in words: "" where one column is a table, or none."""
     if len(data) > MOST_BYTES:
         raise InputError(f"the file has more than {MOST_BYTES // 10**6} MB")
     if data.startswith(b"PK\x03\x04"):
@@ -96,7 +96,7 @@ def _table(kind: str, raw: Iterable[Sequence[str]], needed: str) -> StockTable:
         rows.append(tuple(kept))
         numbers.append(number)
     width = max(map(len, rows), default=0)
-    if width < 2:
+    if width < 2 and needed:
         raise InputError(f"it has not two columns: {needed}")
     return StockTable(kind, tuple(row + ("",) * (width - len(row)) for row in rows), tuple(numbers))
 

@@ -20,6 +20,7 @@ from flightd.ground.wms_exchange.exchange import Exchange, Exchanged
 from flightd.ground.wms_exchange.exchange_file import load_exchange
 
 _BEGIN = 1_760_000_000_000_000_000
+_RUN_NS = 100
 SITE = "hall 3"
 EXPECTED = """name = "wms"
 [expected]
@@ -34,6 +35,13 @@ outbox = "out"
 site = "{SITE}"
 columns = {{ STATUS = "state", PLATZ = "place", NVE = "code" }}
 states = {{ read = "OK", empty = "LEER" }}
+"""
+QUESTIONS = f"""name = "wms"
+[questions]
+inbox = "ask"
+site = "{SITE}"
+settle_s = 0
+columns = {{ place = "LgPla", reason = "Grund", reference = "Beleg" }}
 """
 
 
@@ -115,7 +123,7 @@ def cut_exchanges(monkeypatch: pytest.MonkeyPatch) -> Cuts:
     monkeypatch.setattr(shared_folder, "file_system", cut_files)
     for kind, name in (
         (GroundStore, "next_file"), (GroundStore, "file_lies_there"), (ExpectedStockBook, "keep"),
-        (ExpectedStockBook, "moved"),
+        (ExpectedStockBook, "moved"), (GroundStore, "ask"), (GroundStore, "moved"),
     ):  # fmt: skip
         monkeypatch.setattr(kind, name, _cut_method(getattr(kind, name), cuts))
     return cuts
@@ -130,7 +138,7 @@ def _cut_method(method: Callable[..., Any], cuts: Cuts) -> Callable[..., Any]:
 
 def make_place(folder: Path) -> Path:
     """A station with an inventory of three places, and empty folders."""
-    for name in ("in", "out", "station"):
+    for name in ("in", "ask", "out", "station"):
         (folder / name).mkdir()
     with SqliteStore(folder / "station") as inventory:
         inventory.plan(PlannedLocation(code, "A1") for code in ("A-1", "A-2", "Ä-3"))
@@ -156,9 +164,14 @@ def counted(run: int, **places: str) -> Batch:
     for number, (place, texts) in enumerate(places.items()):
         reads = tuple(CodeRead("QR Code", text, (), True, 3, 1.0) for text in texts.split())
         state = (LocationState.EMPTY, LocationState.READ, LocationState.SEVERAL)[min(len(reads), 2)]
-        seen = Observation(f"run {run}", place, _BEGIN + 100 * run + number, state, 0.9, reads)
+        seen = Observation(f"run {run}", place, _BEGIN + _RUN_NS * run + number, state, 0.9, reads)
         looks.append(SentLook(seen, Standing.CONFIRMED))
     return Batch(SITE, "north", looks=tuple(looks))
+
+
+def after(run: int) -> int:
+    """A time (UTC, ns) between a run's looks and the next one's."""
+    return _BEGIN + _RUN_NS * run + _RUN_NS // 2
 
 
 class Warehouse:

@@ -33,7 +33,7 @@ def exchange(
         typer.Option(
             metavar="FILE|URL",
             envvar="FLIGHTD_STORE",
-            help="The store that counts come out of, as of the other commands.",
+            help="The store that keeps questions and counts, as of the other commands.",
             show_default=False,
         ),
     ] = "",
@@ -43,7 +43,8 @@ def exchange(
     ] = 0.0,
     as_json: AsJson = False,
 ) -> None:
-    """Take expected stock out of a drop folder, and put counts that changed into another, as CSV.
+    """Take expected stock and questions out of drop folders, and put counts that changed, and answers, into
+    another, as CSV.
 
     Folders are here, or URLs such as sftp://USER@HOST/FOLDER; it needs the extra `exchange`.  However often
     it is cut and begun again, no file is taken twice, no count is lost, and the same name has the same

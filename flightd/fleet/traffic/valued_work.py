@@ -11,11 +11,12 @@ from flightd.fleet.traffic.work_queue import NodeWork, Value
 @dataclass(frozen=True, slots=True)
 class PlaceFacts:
     """Of one place: the node from which it is counted, how long ago that was done (None: nobody knows what
-    lies there), and whether what was found is not what the books say."""
+    lies there), whether what was found is not what the books say, and whether somebody asks for it."""
 
     node: str
     age_s: float | None
     contradicted: bool = False
+    asked: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,8 @@ def worth_of(places: Iterable[PlaceFacts]) -> dict[str, Worth]:
         value = Value.OLD if place.age_s is not None else Value.NEVER_COUNTED
         if place.contradicted:
             value = Value.CONTRADICTED
+        if place.asked:
+            value = Value.ASKED
         age_s = place.age_s or 0.0
         known = found.get(place.node)
         if known is not None:

@@ -51,12 +51,12 @@ class SiteFacts:
             raise InputError(
                 "how old counts are is in the ground store, and there is none", remedy="give --store FILE"
             )
-        rows = await asyncio.to_thread(lambda store: list(site_stock(store, site)), self._store)
+        rows, asked = await asyncio.to_thread(_known, self._store, site)
         books = await asyncio.to_thread(self._books, site)
         wrong: frozenset[str] = frozenset()
         if books is not None:
             wrong = await self._reading.run(contradicted_places, _COMPARE_S, rows, *books)
-        return tuple(self._facts(row, row["location"] in wrong) for row in rows)
+        return tuple(self._facts(row, row["location"] in wrong, row["location"] in asked) for row in rows)
 
     def _books(self, site: str) -> tuple[bytes, StockColumns] | None:
         if self._book is None:
@@ -73,10 +73,16 @@ class SiteFacts:
         except InputError:
             return False  # it was put away since
 
-    def _facts(self, row: Mapping[str, Any], contradicted: bool) -> PlaceFacts:
+    def _facts(self, row: Mapping[str, Any], contradicted: bool, asked: bool) -> PlaceFacts:
         ns = row["utc_ns"] if LocationState(row["state"]).is_counted else None
         age_s = None if ns is None else max(self._utc_ns() - ns, 0) / 1e9
-        return PlaceFacts(row["node"], age_s, contradicted)
+        return PlaceFacts(row["node"], age_s, contradicted, asked)
+
+
+def _known(store: GroundStore, site: str) -> tuple[list[dict[str, Any]], frozenset[str]]:
+    """Every place, and those of which a question is open."""
+    rows = list(site_stock(store, site))
+    return rows, store.open_places(site) if rows else frozenset()
 
 
 def contradicted_places(

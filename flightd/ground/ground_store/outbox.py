@@ -1,7 +1,8 @@
 """Counts for another program's folder, file by file: each holds what changed since the one before it.
 
 What a file says is settled in one transaction with the note of what its places were told as, and kept until
-the file lies where it belongs: however often the writing is cut, the same name has the same content.
+the file lies where it belongs: however often the writing is cut, the same name has the same content.  What
+was asked of a place is answered there, too, whether it stands otherwise or not.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from flightd.ground.ground_store import questions
 from flightd.ground.ground_store.engine import Row, Session
+from flightd.ground.ground_store.questions import References
 from flightd.vision.shelf.code_equality import code_key
 
 MOST_PLACES = 20_000
@@ -19,9 +22,11 @@ _CHANGED = (
     "SELECT place.id, place.code, node, place.state, place.texts, place.utc_ns, coalesce(place.look, ?),"
     " run.name, confidence, evidence, told.state, told.texts FROM place LEFT JOIN run ON run.id = place.run"
     " LEFT JOIN outbox_place AS told ON told.outbox = ? AND told.place = place.id WHERE place.site = ?"
-    " AND CASE WHEN told.place IS NULL THEN place.look IS NOT NULL"
+    " AND (CASE WHEN told.place IS NULL THEN place.look IS NOT NULL"
     " ELSE place.state <> told.state OR place.texts <> told.texts OR ? = 1 AND"
-    " coalesce(place.look, ?) <> told.look END ORDER BY place.code LIMIT ?"
+    " coalesce(place.look, ?) <> told.look END OR EXISTS (SELECT 1 FROM question WHERE"
+    " question.site = place.site AND question.place = place.id AND who = ?"
+    f" AND {questions.IS_LOOKED_AT})) ORDER BY place.code LIMIT ?"
 )
 _TOLD = (
     "INSERT INTO outbox_place VALUES (?, ?, ?, ?, ?) ON CONFLICT (outbox, place)"
@@ -32,7 +37,7 @@ _TOLD = (
 @dataclass(frozen=True, slots=True)
 class PlaceCount:
     """How a place stands; `utc_ns` and `run` are of the look by which it does, 0 and "" where none counts
-    any more.  `evidence` names its picture."""
+    any more.  `evidence` names its picture; `references` are of the questions that this answers."""
 
     code: str
     node: str
@@ -42,6 +47,7 @@ class PlaceCount:
     run: str
     confidence: float | None
     evidence: str
+    references: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +60,12 @@ class OutgoingFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outbox:
-    """Who is told what: `name` is whose notes these are.  With `recounts` a place that was found as before
-    is told, too.  `file_name` makes a file's name of its number, `content` what it says."""
+    """Who is told what: `name` is whose notes these are, `who` it is that asks questions.  With `recounts` a
+    place that was found as before is told, too.  `file_name` makes a file's name of its number, `content`
+    what it says."""
 
     name: str
+    who: str
     recounts: bool
     file_name: Callable[[int], str]
     content: Callable[[Sequence[PlaceCount]], bytes]
@@ -71,11 +79,16 @@ def next_file(session: Session, site: int, outbox: Outbox) -> OutgoingFile | Non
     )[0]
     if file:
         return OutgoingFile(file, bytes(content))
-    while rows := session.rows(_CHANGED, b"", outbox.name, site, int(outbox.recounts), b"", MOST_PLACES):
+    answers = questions.looked_at(session, site, outbox.who)
+    asked = (b"", outbox.name, site, int(outbox.recounts), b"", outbox.who, MOST_PLACES)
+    while rows := session.rows(_CHANGED, *asked):
         session.run_many(_TOLD, [(outbox.name, row[0], row[3], row[4], row[6]) for row in rows])
-        told = [_count(row) for row in rows if outbox.recounts or not _is_same(row)]
+        told = [row for row in rows if outbox.recounts or row[0] in answers or not _is_same(row)]
         if told:
-            begun = OutgoingFile(outbox.file_name(number + 1), outbox.content(told))
+            counts = [_count(row, answers) for row in told]
+            begun = OutgoingFile(outbox.file_name(number + 1), outbox.content(counts))
+            answered = [(row[0], row[5]) for row in told if row[0] in answers]
+            questions.tell(session, site, outbox.who, begun.name, answered)
             session.run(
                 "UPDATE outbox SET number = ?, file = ?, content = ? WHERE name = ?",
                 number + 1, begun.name, begun.content, outbox.name,
@@ -99,9 +112,9 @@ def _keys(texts: str) -> set[str]:
     return {code_key(text) for text in json.loads(texts)}
 
 
-def _count(row: Row) -> PlaceCount:
-    _, code, node, state, texts, utc_ns, _, run, confidence, evidence, *_ = row
+def _count(row: Row, answers: References) -> PlaceCount:
+    place, code, node, state, texts, utc_ns, _, run, confidence, evidence, *_ = row
     return PlaceCount(
         code, node, state, tuple(json.loads(texts)), utc_ns or 0, run or "", confidence,
-        "" if evidence is None else bytes(evidence).hex(),
+        "" if evidence is None else bytes(evidence).hex(), answers.get(place, ()),
     )  # fmt: skip

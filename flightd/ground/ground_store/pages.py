@@ -163,6 +163,21 @@ def decisions(session: Session, site: int, code: str, limit: int) -> list[dict[s
     return [_document(("utc_ns", "seen_utc_ns", "what", "who", "note"), row) for row in rows]
 
 
+def questions(session: Session, site: int, after: Mark | None, limit: int) -> list[dict[str, Any]]:
+    """What was asked of places, newest first; `answered_ns` is of the look that answers, None of none."""
+    mark = after or _END
+    rows = session.rows(
+        "SELECT question.utc_ns, question.id, code, who, reason, reference, coalesce(answered_ns,"
+        " CASE WHEN place.utc_ns > question.utc_ns THEN place.utc_ns END), nullif(file, '') FROM question"
+        " JOIN place ON place.id = question.place WHERE question.site = ?"
+        " AND (question.utc_ns, question.id) < (?, ?)"
+        " ORDER BY question.utc_ns DESC, question.id DESC LIMIT ?",
+        site, mark.utc_ns, mark.id, limit,
+    )  # fmt: skip
+    names = ("utc_ns", "id", "location", "who", "reason", "reference", "answered_ns", "file")
+    return [_document(names, row) for row in rows]
+
+
 def _only(found: list[Row], otherwise: str) -> int:
     if not found:
         raise InputError(otherwise)

@@ -10,7 +10,8 @@ from typing import Any, Self
 
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
-from flightd.ground.ground_store import events, outbox, pages
+from flightd.ground.drop import Drop
+from flightd.ground.ground_store import events, outbox, pages, questions
 from flightd.ground.ground_store.batch import Batch, Receipt
 from flightd.ground.ground_store.engine import Engine, Session, listed
 from flightd.ground.ground_store.events import Event
@@ -19,6 +20,7 @@ from flightd.ground.ground_store.migrations import brought_up
 from flightd.ground.ground_store.outbox import Outbox, OutgoingFile
 from flightd.ground.ground_store.pages import MOST_ROWS, Mark
 from flightd.ground.ground_store.parquet import export
+from flightd.ground.ground_store.questions import Question
 from flightd.ground.ground_store.take_batch import Taken, take_batch
 
 
@@ -111,6 +113,27 @@ class GroundStore:
         with self._engine.writing() as session:
             outbox.file_lies_there(session, box, file)
 
+    def ask(self, site: str, who: str, asked: Sequence[Question], drop: Drop) -> None:
+        """As `questions.ask`, of a site that the store knows."""
+        with self._engine.writing() as session:
+            number = pages.site_id(session, site)
+            questions.ask(session, number, who, asked, drop, self._utc_ns())
+
+    def dropped(self, inbox: str) -> Drop | None:
+        """As `questions.dropped`."""
+        with self._engine.reading() as session:
+            return questions.dropped(session, inbox)
+
+    def moved(self, inbox: str) -> None:
+        """As `questions.moved`."""
+        with self._engine.writing() as session:
+            questions.moved(session, inbox)
+
+    def open_places(self, site: str) -> frozenset[str]:
+        """As `questions.open_places`."""
+        with self._engine.reading() as session:
+            return questions.open_places(session, pages.site_id(session, site))
+
     def counts(self) -> dict[str, int]:
         """How much the store holds."""
         with self._engine.reading() as session:
@@ -121,6 +144,7 @@ class GroundStore:
                 "looks": int(session.rows("SELECT coalesce(sum(looks), 0) FROM run")[0][0]),
                 "flights": session.rows("SELECT count(*) FROM flight")[0][0],
                 "decisions": session.rows("SELECT count(*) FROM decision")[0][0],
+                "questions": session.rows("SELECT count(*) FROM question")[0][0],
                 "audit": session.rows("SELECT count(*) FROM audit")[0][0],
             }
 
@@ -175,6 +199,11 @@ class GroundStore:
         """As `pages.decisions`."""
         with self._asked(site, limit) as (session, number):
             return pages.decisions(session, number, code, limit)
+
+    def questions(self, site: str, after: Mark | None = None, limit: int = MOST_ROWS) -> list[dict[str, Any]]:
+        """As `pages.questions`."""
+        with self._asked(site, limit) as (session, number):
+            return pages.questions(session, number, after, limit)
 
     @contextmanager
     def _asked(self, site: str, limit: int) -> Iterator[tuple[Session, int]]:

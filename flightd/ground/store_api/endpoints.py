@@ -118,6 +118,17 @@ ENDPOINTS: Sequence[Endpoint] = (
         lambda store, p: store.decisions(p["site"], p["location"], p["limit"]),
         {"utc": "time", "seen_utc": "time", "what": "string", "who": "string", "note": "string"},
     ),
+    Endpoint(
+        "/questions",
+        "What other programs ask of places, newest first.",
+        (_SITE, _AFTER_MARK, _LIMIT),
+        lambda store, p: store.questions(p["site"], p["after"], p["limit"]),
+        {
+            "id": "string", "utc": "time", "location": "string", "who": "string", "reason": "string",
+            "reference": "string", "answered": "time?", "file": "string?",
+        },
+        "mark",
+    ),
 )  # fmt: skip
 
 STATES = tuple(state.value for state in LocationState)

@@ -12,14 +12,16 @@ from pathlib import Path
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.shared_folder import SharedFolder
-from flightd.ground.wms_exchange.exchange_file import CountsSection, ExchangeFile, ExpectedSection
-from flightd.ground.wms_exchange.inbox import Inbox, TakenFile
+from flightd.ground.wms_exchange.exchange_file import CountsSection, ExchangeFile, InboxSection
+from flightd.ground.wms_exchange.inbox import Inbox, TakenFile, Taker
 from flightd.ground.wms_exchange.outbox import deliver_counts
+from flightd.ground.wms_exchange.question_taker import QuestionTaker
+from flightd.ground.wms_exchange.stock_taker import StockTaker
 
 
 @dataclass(slots=True)
 class Exchanged:
-    """What a pass did, and what kept it from more: one side goes on without the other."""
+    """What a pass did, and what kept it from more: each part goes on without the others."""
 
     files: list[TakenFile] = field(default_factory=list)
     sent: list[str] = field(default_factory=list)
@@ -28,7 +30,8 @@ class Exchanged:
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """By the file at `path`, with the `store` for counts; `folder` opens one by address, file and key."""
+    """By the file at `path`, with the `store` for questions and counts; `folder` opens one by address, file
+    and key."""
 
     path: Path
     asked: ExchangeFile
@@ -38,25 +41,34 @@ class Exchange:
     utc_ns: Callable[[], int] = time.time_ns
 
     def once(self) -> Exchanged:
-        """One pass.  InputError where counts are asked for without a store."""
-        expected, counts = self.asked.expected, self.asked.counts
-        if counts is not None and self.store is None:
-            raise InputError(
-                "counts come out of a store", file=self.path, key="counts", remedy="give --store"
-            )
+        """One pass.  InputError where questions or counts are exchanged without a store."""
+        expected, questions, counts = self.asked.expected, self.asked.questions, self.asked.counts
+        self._check_store()
         done = Exchanged()
         if expected is not None:
             with _kept(done.failures):
-                self._take(expected, done)
+                taker = StockTaker(expected, self.asked.name, self.path, self.utc_ns)
+                self._take(expected, "expected", taker, done)
+        if questions is not None and self.store is not None:
+            with _kept(done.failures):
+                asker = QuestionTaker(self.store, questions, self.asked.name, self.path)
+                self._take(questions, "questions", asker, done)
         if counts is not None and self.store is not None:
             with _kept(done.failures):
                 self._deliver(counts, self.store, done)
         return done
 
-    def _take(self, asked: ExpectedSection, done: Exchanged) -> None:
-        with closing(self.folder(asked.inbox, self.path, "expected.inbox")) as folder:
-            inbox = Inbox(folder, asked, self.asked.name, self.path, self.utc_ns)
-            done.files.extend(inbox.take(self.sleep))
+    def _check_store(self) -> None:
+        for key, asked, what in (
+            ("questions", self.asked.questions, "questions are kept in a store"),
+            ("counts", self.asked.counts, "counts come out of a store"),
+        ):
+            if asked is not None and self.store is None:
+                raise InputError(what, file=self.path, key=key, remedy="give --store")
+
+    def _take(self, asked: InboxSection, key: str, taker: Taker, done: Exchanged) -> None:
+        with closing(self.folder(asked.inbox, self.path, f"{key}.inbox")) as folder:
+            done.files.extend(Inbox(folder, asked, taker).take(self.sleep))
 
     def _deliver(self, asked: CountsSection, store: GroundStore, done: Exchanged) -> None:
         with closing(self.folder(asked.outbox, self.path, "counts.outbox")) as folder:

@@ -30,6 +30,8 @@ class CountField(enum.StrEnum):
     CONFIDENCE = "confidence"
     PICTURE = "picture"
     """The name under which the store has it."""
+    REFERENCE = "reference"
+    """Of the question that this answers."""
 
 
 class StockNames(Section):
@@ -40,16 +42,36 @@ class StockNames(Section):
     quantity: str | None = Field(default=None, min_length=1)
 
 
-class ExpectedSection(Section):
-    """Expected stock that comes in."""
+class QuestionNames(Section):
+    """What the columns are called, whatever their case."""
+
+    place: str = Field(min_length=1)
+    reason: str | None = Field(default=None, min_length=1)
+    reference: str | None = Field(default=None, min_length=1)
+
+
+class InboxSection(Section):
+    """Files that come in."""
 
     inbox: str = Field(min_length=1, description="Folder, or URL of one")
     pattern: str = Field(default="*.csv", min_length=1, description="Of their names, whatever the case")
+    settle_s: float = Field(default=10.0, ge=0.0, le=600.0, description="So long a file has to stay as it is")
+
+
+class ExpectedSection(InboxSection):
+    """Expected stock that comes in."""
+
     folder: Path = Field(description="The station's folder, as of `flightd ground --folder`")
     flights: tuple[Path, ...] = Field(default=(), description="And as of its `--flights`")
     inventory: str = Field(default=".", description="Of which inventory in them")
-    settle_s: float = Field(default=10.0, ge=0.0, le=600.0, description="So long a file has to stay as it is")
     columns: StockNames
+
+
+class QuestionsSection(InboxSection):
+    """Places that come in, of which is asked what lies there now."""
+
+    site: str = Field(min_length=1, description="Of which site of the store")
+    columns: QuestionNames
 
 
 class CountsSection(Section):
@@ -77,6 +99,7 @@ class ExchangeFile(Section):
 
     name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")
     expected: ExpectedSection | None = None
+    questions: QuestionsSection | None = None
     counts: CountsSection | None = None
 
 
@@ -90,19 +113,38 @@ def load_exchange(path: Path) -> ExchangeFile:
         )  # a misspelt key first
         more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
         raise InputError(f"{complaint(found[0], ExchangeFile)}{more}", file=path) from None
-    expected, counts = file.expected, file.counts
-    if expected is None and counts is None:
+    expected, questions, counts = file.expected, file.questions, file.counts
+    if expected is None and questions is None and counts is None:
         raise InputError(
-            "nothing is exchanged", file=path, remedy="add a table [expected], [counts], or both"
+            "nothing is exchanged", file=path, remedy="add a table [expected], [questions] or [counts]"
         )
     here = path.resolve().parent
     if expected is not None:
         inbox, folder = _address(here, expected.inbox), here / expected.folder
         flights = tuple(here / path for path in expected.flights)
         expected = expected.model_copy(update={"inbox": inbox, "folder": folder, "flights": flights})
+    if questions is not None:
+        questions = questions.model_copy(update={"inbox": _address(here, questions.inbox)})
     if counts is not None:
         counts = counts.model_copy(update={"outbox": _address(here, counts.outbox)})
-    return file.model_copy(update={"expected": expected, "counts": counts})
+    file = file.model_copy(update={"expected": expected, "questions": questions, "counts": counts})
+    _check_together(file, path)
+    return file
+
+
+def _check_together(file: ExchangeFile, path: Path) -> None:
+    expected, questions, counts = file.expected, file.questions, file.counts
+    if questions is None:
+        return
+    if expected is not None and (expected.inbox, expected.pattern.casefold()) == (
+        questions.inbox, questions.pattern.casefold(),
+    ):  # fmt: skip
+        remedy = "give another folder, or another pattern"
+        raise InputError("these files are expected stock", file=path, key="questions.inbox", remedy=remedy)
+    if counts is not None and counts.site != questions.site:
+        remedy = f"give {counts.site!r}, or leave [counts] out"
+        raise InputError("counts of another site answer no question", file=path, key="questions.site",
+                         remedy=remedy)  # fmt: skip
 
 
 def _address(here: Path, given: str) -> str:

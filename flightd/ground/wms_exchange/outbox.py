@@ -20,13 +20,14 @@ from flightd.ground.wms_exchange.exchange_file import CountField, CountsSection
 def deliver_counts(
     folder: SharedFolder, store: GroundStore, asked: CountsSection, name: str, file: Path
 ) -> Iterator[str]:
-    """All that changed since the last delivery to `name`; yields the names of files that lie there now.  Cut
-    anywhere and begun again, it writes the same files.  InputError, which names the `file` that asks for it,
-    where the store has not the site."""
+    """All that changed since the last delivery to `name`, and what it asked for; yields the names of files
+    that lie there now.  Cut anywhere and begun again, it writes the same files.  InputError, which names the
+    `file` that asks for it, where the store has not the site."""
     box = f"{name}/{asked.site}"
     mark = hashlib.sha256(f"{store.id}/{box}".encode()).hexdigest()[:8]
     told = Outbox(
         name=box,
+        who=name,
         recounts=asked.recounts,
         file_name=lambda number: f"{asked.prefix}-{mark}-{number:06}.csv",
         content=lambda counts: counts_csv(counts, asked),
@@ -75,4 +76,5 @@ def _rows(count: PlaceCount, asked: CountsSection) -> Iterator[dict[CountField, 
             CountField.NODE: count.node,
             CountField.CONFIDENCE: "" if count.confidence is None else f"{count.confidence:.3f}",
             CountField.PICTURE: count.evidence,
+            CountField.REFERENCE: ", ".join(count.references),
         }

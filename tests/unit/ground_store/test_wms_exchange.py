@@ -107,7 +107,7 @@ def test_folders_may_be_wherever_fsspec_finds_them(place: Path, store: GroundSto
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("name = 'wms'", "nothing is exchanged; add a table [expected], [counts], or both"),
+        ("name = 'wms'", "nothing is exchanged; add a table [expected], [questions] or [counts]"),
         (EXPECTED.replace("inbox", "inbx"), "expected.inbx: unknown key; did you mean inbox?"),
         (EXPECTED.replace('code = "NVE",', ""), "expected.columns.code: is missing; add it"),
         (COUNTS.replace('"code"', '"codes"'), "counts.columns.NVE: "),
