@@ -54,6 +54,8 @@ program=/opt/flightd
 unit=/etc/systemd/system/flightd.service
 rules=/etc/udev/rules.d/99-flightd.rules
 ground_unit=/etc/systemd/system/flightd-ground.service
+deliver_unit=/etc/systemd/system/flightd-deliver.service
+deliver_timer=/etc/systemd/system/flightd-deliver.timer
 users=/etc/sysusers.d/flightd.conf
 
 # Whether the system that is installed into is the one that runs.
@@ -61,12 +63,13 @@ running() { [ -z "$root" ] && [ -d /run/systemd/system ]; }
 
 remove() {
     if running; then
-        systemctl disable --now flightd.service flightd-ground.service 2>/dev/null || true
+        systemctl disable --now flightd.service flightd-ground.service flightd-deliver.timer 2>/dev/null || true
+        systemctl stop flightd-deliver.service 2>/dev/null || true
     fi
     local folder=$root$program
     rm -rf "${folder:?}"
     rm -f "$root/usr/local/bin/flightd" "$root/usr/local/bin/flightctl"
-    rm -f "$root$unit" "$root$ground_unit" "$root$rules" "$root$users"
+    rm -f "$root$unit" "$root$ground_unit" "$root$deliver_unit" "$root$deliver_timer" "$root$rules" "$root$users"
     if [ "$purge" = yes ]; then
         rm -rf "$root/etc/flightd" "$root/var/lib/flightd" "$root/var/lib/flightd-ground"
         userdel ${root:+--prefix "$root"} flightd-ground 2>/dev/null || true
@@ -121,6 +124,8 @@ keep() {
 install_files() {
     install -D -m 644 "$source/systemd/flightd.service" "$root$unit"
     install -D -m 644 "$source/systemd/flightd-ground.service" "$root$ground_unit"
+    install -D -m 644 "$source/systemd/flightd-deliver.service" "$root$deliver_unit"
+    install -D -m 644 "$source/systemd/flightd-deliver.timer" "$root$deliver_timer"
     install -D -m 644 "$source/systemd/99-flightd.rules" "$root$rules"
     install -D -m 644 "$source/systemd/flightd.sysusers" "$root$users"
     systemd-sysusers ${root:+--root="$root"} "$root$users"

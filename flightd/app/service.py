@@ -14,6 +14,7 @@ from flightd.adapters.metrics.metrics import MetricsBook
 from flightd.adapters.metrics.server import MetricsServer
 from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.systemd import SystemdMonitor
+from flightd.app.armed_mark import ArmedMark
 from flightd.config.metrics import MetricsConfig
 from flightd.ports import Monitor
 from flightd.runtime.line_writer import LineWriter
@@ -84,6 +85,8 @@ async def monitors(
         if (systemd := SystemdMonitor.of_environment(environment)) is not None:
             stack.callback(systemd.close)
             found.append(systemd)
+        if (mark := ArmedMark.of_environment(environment)) is not None:
+            found.append(mark)
         if settings.listen:
             book = MetricsBook()
             server = MetricsServer(settings.address, book.registry)

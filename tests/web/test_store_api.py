@@ -23,9 +23,11 @@ from flightd.ground.access.key_book import KeyBook, Scope
 from flightd.ground.access.passwords import hashed_secret, new_key
 from flightd.ground.access.roles import Role
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
+from flightd.ground.drop import Drop
 from flightd.ground.ground_store.batch import Batch, SentLook
 from flightd.ground.ground_store.feeder import Feeder
 from flightd.ground.ground_store.open_store import opened_store
+from flightd.ground.ground_store.questions import Question
 from flightd.ground.ground_store.store import GroundStore
 from tests.command import Command
 from tests.rigs.event_loops import in_real_time
@@ -100,7 +102,15 @@ async def test_every_endpoint_answers_as_its_document_says(hall: Path, tmp_path:
     with SqliteStore(hall / "tuesday") as later:
         later.commit(look("AL-01-2-1", LocationState.EMPTY, run="2026-W48", at_s=604_800))
     async with asked(hall, tmp_path / "state", Scope.STOCK, Scope.PICTURES) as program:
+        with opened_store(str(tmp_path / "store.db")) as store:  # as `flightd store exchange` does beside it
+            for number, place in enumerate(("AL-01-1-1", "AL-01-2-1")):
+                one = Question(place, "pick was short", f"B-{number}")
+                store.ask(SITE, "wms", [one], Drop("in", "ask.csv", str(number), "1 questions"))
         assert (await program.page("/sites"))["rows"] == [{"site": SITE}]
+        newest = await program.page(f"/questions?{_QUERY}&limit=1")
+        (question,) = (await program.page(f"/questions?{_QUERY}&limit=1&after={newest['next']}"))["rows"]
+        assert (question["location"], question["reference"]) == ("AL-01-1-1", "B-0")
+        assert (question["answered"], question["file"]) == (None, None)
         first = await program.page(f"/stock?{_QUERY}&limit=3")
         assert [row["location"] for row in first["rows"]] == ["A-GATE", "AL-01-1-1", "AL-01-2-1"]
         rest = await program.page(f"/stock?{_QUERY}&after={first['next']}")

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from flightd.cli.options import AsJson
-from flightd.cli.store.options import Pictures, StoreOrStation, target
+from flightd.cli.store.options import Pictures, StoreOrStation, Unless, between_flights
 
 
 def register(app: typer.Typer) -> None:
@@ -35,6 +35,7 @@ def deliver(
         str,
         typer.Option(metavar="NAME", help="Who delivers, for the store's books.  Default: this machine."),
     ] = "",
+    unless: Unless = None,
     as_json: AsJson = False,
 ) -> None:
     """Deliver inventories with their pictures, flights, and decisions to the store.
@@ -47,21 +48,28 @@ def deliver(
       flightd store deliver out --store counts.db
       flightd store deliver /var/lib/flightd --store postgresql://flightd@db/counts --evidence /srv/evidence
       FLIGHTD_STORE_KEY=… flightd store deliver /var/lib/flightd --store https://ground.hall:8443
+      flightd store deliver /var/lib/flightd --store counts.db --unless /run/flightd/armed
     """
-    with target(store, evidence) as into:
-        from flightd.ground.ground_store.deliver_folder import deliver_path
-        from flightd.ground.ground_store.sender import Delivered
+    from flightd.ground.ground_store.between_flights import FlightBeganError
+    from flightd.ground.ground_store.deliver_folder import deliver_path
+    from flightd.ground.ground_store.sender import Delivered
 
-        done = Delivered()
-        for path in paths:
-            deliver_path(path, site, source or platform.node(), into, done)
+    done, stopped = Delivered(), ""
+    try:
+        with between_flights(store, evidence, unless) as into:
+            for path in paths:
+                deliver_path(path, site, source or platform.node(), into, done)
+    except FlightBeganError as err:
+        stopped = str(err)
     if as_json:
-        print(json.dumps(asdict(done)))
+        print(json.dumps({**asdict(done), "stopped": stopped}))
         return
     print(
         f"{done.looks} looks delivered, {done.changed} changed, {done.already} were there already; "
         f"{done.pictures} pictures, {done.flights} flights, {done.decisions} decisions"
     )
+    if stopped:
+        print(stopped)
 
 
 def prune(
@@ -70,6 +78,7 @@ def prune(
     ],
     store: StoreOrStation,
     evidence: Pictures = None,
+    unless: Unless = None,
     as_json: AsJson = False,
 ) -> None:
     """Take away what the store has of an inventory's older runs: looks, and their pictures.
@@ -81,12 +90,20 @@ def prune(
     Examples:
       flightd store prune /var/lib/flightd/inventory --store counts.db
     """
-    with target(store, evidence) as into:
-        from flightd.ground.ground_store.prune import prune as prune_folder
+    from flightd.ground.ground_store.between_flights import FlightBeganError
+    from flightd.ground.ground_store.prune import Pruned
+    from flightd.ground.ground_store.prune import prune as prune_folder
 
-        pruned = prune_folder(folder, into)
+    pruned, stopped = Pruned(0, 0, 0), ""
+    try:
+        with between_flights(store, evidence, unless) as into:
+            pruned = prune_folder(folder, into)
+    except FlightBeganError as err:
+        stopped = str(err)
     if as_json:
-        print(json.dumps(asdict(pruned)))
+        print(json.dumps({**asdict(pruned), "stopped": stopped}))
         return
     kept = f"; {pruned.stay} older looks are not in the store and stay" if pruned.stay else ""
     print(f"{pruned.looks} looks and {pruned.pictures} pictures taken away{kept}")
+    if stopped:
+        print(stopped)

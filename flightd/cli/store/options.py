@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
@@ -45,6 +46,29 @@ StoreOrStation: TypeAlias = Annotated[
         show_default=False,
     ),
 ]
+
+Unless: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--unless",
+        metavar="FILE",
+        help="Do nothing while there is this file, and stop as it comes: /run/flightd/armed is there while"
+        " the motors of a drone on this computer may turn.",
+        show_default=False,
+    ),
+]
+
+
+@contextmanager
+def between_flights(store: str, evidence: str | None, unless: Path | None) -> Iterator[Target]:
+    """As `target`; FlightBeganError where there is a file `unless`."""
+    with target(store, evidence) as into:
+        if unless is None:
+            yield into
+            return
+        from flightd.ground.ground_store.between_flights import BetweenFlights
+
+        yield BetweenFlights(into, unless)
 
 
 @contextmanager

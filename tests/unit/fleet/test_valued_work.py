@@ -29,11 +29,14 @@ def test_a_node_is_worth_what_its_most_valuable_place_is_and_as_old_as_its_oldes
         PlaceFacts("A2", DAY_S),
         PlaceFacts("A3", 60.0, contradicted=True),
         PlaceFacts("A3", None),
+        PlaceFacts("A4", DAY_S, contradicted=True, asked=True),
+        PlaceFacts("A4", None),
     ]
     assert worth_of(places) == {
         "A1": Worth(Value.OLD, 3 * DAY_S),
         "A2": Worth(Value.NEVER_COUNTED, DAY_S),
         "A3": Worth(Value.CONTRADICTED, 60.0),
+        "A4": Worth(Value.ASKED, DAY_S),
     }
 
 

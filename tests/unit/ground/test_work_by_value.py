@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,11 +18,13 @@ from flightd.core.planned_flight import MOST_NODES
 from flightd.core.types import CodeRead, Phase
 from flightd.fleet.traffic.valued_work import PlaceFacts, Worth, worth_of
 from flightd.fleet.traffic.work_queue import Value
+from flightd.ground.drop import Drop
 from flightd.ground.expected_stock_book import ExpectedStock, ExpectedStockBook
 from flightd.ground.fleet.fleet_memory import FleetMemory
 from flightd.ground.fleet.site_facts import SiteFacts
 from flightd.ground.ground_store.batch import Batch, SentLook
 from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.questions import Question
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.reading_process import ReadingProcess
@@ -109,6 +112,15 @@ def test_ages_come_of_the_ground_store_and_contradictions_of_the_newest_books_of
     }
     assert real(asked("depot")) == ()
     assert worth_of(known)["A2"].value is Value.CONTRADICTED
+    store.ask("hall", "wms", [Question("P3"), Question("P5")], Drop("in", "ask.csv", "1a2b", "2 questions"))
+    worth = worth_of(real(asked("hall")))
+    assert [node for node, its in worth.items() if its.value is Value.ASKED] == ["A3", "A5"]
+    at_ns = time.time_ns() + 1  # later than the store heard the question
+    answer = Observation("answer", "P3", at_ns, LocationState.OCCLUDED, 0.9, ())
+    store.take(Batch("hall", "a", looks=(SentLook(answer, Standing.CONFIRMED),)))
+    worth = worth_of(real(asked("hall")))
+    assert worth["A3"].value is Value.NEVER_COUNTED, "an answer, though nobody knows what lies there"
+    assert worth["A5"].value is Value.ASKED
 
 
 def test_without_a_ground_store_nothing_is_said_of_value() -> None:

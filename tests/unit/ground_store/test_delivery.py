@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import random
 import subprocess
 import sys
@@ -19,6 +20,8 @@ from flightd.core.inventory import LocationState, Observation, PlannedLocation, 
 from flightd.core.types import CodeRead
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
 from flightd.ground.ground_store import sender
+from flightd.ground.ground_store.batch import Batch, Receipt
+from flightd.ground.ground_store.between_flights import BetweenFlights, FlightBeganError
 from flightd.ground.ground_store.deliver_folder import deliver_path
 from flightd.ground.ground_store.engine import Engine, Row, Session
 from flightd.ground.ground_store.evidence import Evidence, FolderEvidence
@@ -26,6 +29,7 @@ from flightd.ground.ground_store.postgres_engine import PostgresSession
 from flightd.ground.ground_store.prune import prune
 from flightd.ground.ground_store.sender import Delivered, deliver_inventory
 from flightd.ground.ground_store.store import GroundStore
+from tests.command import Command
 from tests.web.stock_rig import RACKS, counted_store, flown_log, picture_of
 
 SITE = "hall 3"
@@ -226,6 +230,51 @@ def test_an_inventory_of_no_known_site_is_refused(store: GroundStore, tmp_path: 
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match=r"neither an inventory\.db nor a flight log"):
         deliver_path(tmp_path / "empty", SITE, "station", store, Delivered())
+
+
+def test_a_flight_that_begins_stops_a_delivery_and_the_rest_comes_after_it(
+    store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sender, "MOST_LOOKS", 10)
+    mark = tmp_path / "armed"
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for number in range(25):
+            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
+
+    take = store.take
+
+    def armed_meanwhile(batch: Batch) -> Receipt:
+        if batch.looks:
+            mark.touch()
+        return take(batch)
+
+    monkeypatch.setattr(store, "take", armed_meanwhile)
+    with pytest.raises(FlightBeganError, match="armed: a flight is on, what is left is for later"):
+        deliver_inventory(tmp_path / "inventory", SITE, "north", BetweenFlights(store, mark), Delivered())
+    assert store.counts()["looks"] == 10
+    with pytest.raises(FlightBeganError):
+        BetweenFlights(store, mark)
+    mark.unlink()
+    monkeypatch.undo()
+    deliver_inventory(tmp_path / "inventory", SITE, "north", BetweenFlights(store, mark), Delivered())
+    assert store.counts()["looks"] == 25
+
+
+def test_the_commands_do_nothing_while_a_flight_is_on(flightd: Command, tmp_path: Path) -> None:
+    counted_store(tmp_path / "monday")
+    mark, store = tmp_path / "armed", tmp_path / "counts.db"
+    mark.touch()
+    deliver = ("store", "deliver", tmp_path / "monday", "--store", store, "--site", SITE, "--unless", mark)
+    prune_it = ("store", "prune", tmp_path / "monday", "--store", store, "--unless", mark)
+    stopped = f"{mark}: a flight is on, what is left is for later"
+    for words in (deliver, prune_it):
+        ended = flightd(*words)
+        assert (ended.returncode, ended.stderr, ended.stdout.splitlines()[-1]) == (0, "", stopped)
+        assert json.loads(flightd(*words, "--json").stdout)["stopped"] == stopped
+    mark.unlink()
+    told = json.loads(flightd(*deliver, "--json").stdout)
+    assert (told["looks"], told["stopped"]) == (10, "")
+    assert json.loads(flightd(*prune_it, "--json").stdout)["stopped"] == ""
 
 
 def test_only_what_the_store_has_is_pruned(store: GroundStore, tmp_path: Path) -> None:

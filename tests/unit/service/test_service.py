@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import shutil
 import socket
 import subprocess
@@ -13,13 +14,16 @@ from pathlib import Path
 
 import pytest
 
+from flightd.app.armed_mark import ArmedMark
 from flightd.app.service import note_start, was_started_before
 from tests.command import Command
+from tests.web.stock_rig import RACKS, counted_store, flown_log
 
 SYSTEMD = Path(__file__).parents[3] / "systemd"
 UNIT = SYSTEMD / "flightd.service"
 GROUND_UNIT = SYSTEMD / "flightd-ground.service"
-UNITS = pytest.mark.parametrize("unit", [UNIT, GROUND_UNIT], ids=lambda unit: unit.stem)
+DELIVER_UNIT = SYSTEMD / "flightd-deliver.service"
+UNITS = pytest.mark.parametrize("unit", [UNIT, GROUND_UNIT, DELIVER_UNIT], ids=lambda unit: unit.stem)
 
 
 def tool(name: str) -> str:
@@ -72,7 +76,10 @@ def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path, unit: Path) -
     program.chmod(0o755)
     copy = tmp_path / unit.name  # verify wants the program to exist
     copy.write_text(unit.read_text().replace("ExecStart=/opt/flightd/bin/flightd", f"ExecStart={program}"))
-    result = subprocess.run([analyze, "verify", str(copy)], capture_output=True, text=True, check=False)
+    for timer in SYSTEMD.glob(f"{unit.stem}.timer"):
+        shutil.copy(timer, tmp_path)
+    files = [str(copy), *map(str, tmp_path.glob("*.timer"))]
+    result = subprocess.run([analyze, "verify", *files], capture_output=True, text=True, check=False)
     assert (result.returncode, result.stdout + result.stderr) == (0, "")
 
 
@@ -85,7 +92,7 @@ def test_the_services_exposure_is_low(unit: Path) -> None:
         text=True,
         check=False,
     )
-    found = re.search(r"exposure level for flightd(?:-ground)?\.service: ([\d.]+)", result.stdout)
+    found = re.search(r"exposure level for flightd(?:-ground|-deliver)?\.service: ([\d.]+)", result.stdout)
     if found is None:
         pytest.skip(f"this systemd-analyze cannot rate a file: {result.stderr.strip()}")
     assert float(found[1]) <= 2.5
@@ -96,7 +103,10 @@ def settings(unit: Path) -> set[str]:
     return {line for line in unit.read_text().splitlines() if line[:1] not in {"", "#", "["}}
 
 
-def test_the_ground_station_is_shut_in_as_the_daemon_is() -> None:
+@pytest.mark.parametrize(
+    ("unit", "user"), [(GROUND_UNIT, "flightd-ground"), (DELIVER_UNIT, "flightd")], ids=["ground", "deliver"]
+)
+def test_what_runs_beside_the_daemon_is_shut_in_as_it_is(unit: Path, user: str) -> None:
     shutting = re.compile(
         r"(Protect|Private|Restrict|NoNew|Memory(Deny)|Lock|System|Capability|Ambient|Keyring|RemoveIPC|IPA|Device)"
     )
@@ -105,9 +115,62 @@ def test_the_ground_station_is_shut_in_as_the_daemon_is() -> None:
     }
     daemons = {line for line in settings(UNIT) if shutting.match(line)} - needed_by_the_drone
     assert len(daemons) > 25
-    assert daemons <= settings(GROUND_UNIT)
-    assert "User=flightd-ground" in settings(GROUND_UNIT)
-    assert "u flightd-ground -" in (SYSTEMD / "flightd.sysusers").read_text()
+    assert daemons <= settings(unit)
+    assert f"User={user}" in settings(unit)
+    assert f"u {user} -" in (SYSTEMD / "flightd.sysusers").read_text()
+
+
+def test_a_delivery_yields_to_everything_and_waits_for_its_file() -> None:
+    found = settings(DELIVER_UNIT)
+    assert {"CPUSchedulingPolicy=idle", "IOSchedulingClass=idle", "Nice=19", "CPUWeight=1"} <= found
+    assert "ConditionPathExists=/etc/flightd/deliver.env" in found
+    assert "EnvironmentFile=/etc/flightd/deliver.env" in found
+    assert "WantedBy=timers.target" in settings(DELIVER_UNIT.with_suffix(".timer"))
+
+
+def test_the_units_words_deliver_and_prune_but_not_while_the_daemon_is_armed(tmp_path: Path) -> None:
+    counted_store(tmp_path / "drone" / "inventory")
+    flown_log(tmp_path / "drone" / "inventory" / "flight.mcap", RACKS)
+    mark = mark_of(tmp_path)
+    program = tmp_path / "program"
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m flightd "$@"\n')
+    program.chmod(0o755)
+    places = {
+        "/opt/flightd/bin/flightd": program,
+        "/run/flightd/armed": mark,
+        "/var/lib/flightd": tmp_path / "drone",
+    }
+
+    def run(**more: str) -> list[str]:
+        environment = {**os.environ, "FLIGHTD_STORE": str(tmp_path / "counts.db"), **more}
+        said = []
+        for line in DELIVER_UNIT.read_text().splitlines():
+            if line.startswith("ExecStart="):
+                for name, path in places.items():
+                    line = line.replace(name, str(path))  # noqa: PLW2901
+                ended = subprocess.run(
+                    shlex.split(line.partition("=")[2]), capture_output=True, text=True, check=True,
+                    env=environment, cwd=SYSTEMD.parent,
+                )  # fmt: skip
+                said += ended.stdout.splitlines()
+        return said
+
+    mark.touch()
+    assert run()[-1] == f"{mark}: a flight is on, what is left is for later"
+    mark.unlink()
+    (line,) = run()
+    assert line.startswith("10 looks delivered")
+    line, pruned = run(FLIGHTD_PRUNE=str(tmp_path / "drone" / "inventory"))
+    assert line.startswith("0 looks delivered")
+    assert pruned.endswith("pictures taken away")
+
+
+def mark_of(folder: Path) -> Path:
+    """The daemon's own mark, where /run/flightd is that folder."""
+    found = ArmedMark.of_environment({"RUNTIME_DIRECTORY": "/run/flightd"})
+    assert found is not None
+    assert str(found.file) == "/run/flightd/armed", "the unit's"
+    return folder / found.file.name
 
 
 def test_the_units_words_start_a_ground_station(tmp_path: Path) -> None:
@@ -130,6 +193,15 @@ def test_the_units_words_start_a_ground_station(tmp_path: Path) -> None:
         finally:
             process.terminate()
             assert process.wait(20) == 0
+
+
+@pytest.mark.parametrize("file", sorted(SYSTEMD.glob("flightd*.*")), ids=lambda file: file.name)
+def test_the_install_script_installs_every_unit_and_takes_it_away(file: Path) -> None:
+    text = (SYSTEMD / "install.sh").read_text()
+    (variable,) = re.findall(rf'"\$source/systemd/{re.escape(file.name)}" "\$root\$(\w+)"', text)
+    removed = next(line for line in text.splitlines() if line.strip().startswith('rm -f "$root$unit"'))
+    assert f'"$root${variable}"' in removed
+    assert f"enable {file.name}" not in text
 
 
 def test_the_install_script_is_sound() -> None:
