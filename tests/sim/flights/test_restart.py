@@ -38,10 +38,13 @@ async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp
         await rig.until(lambda status: status.phase in _UP, 120)
         assert [message for message in rig.said if message.get("READY") == "1"]
         assert [message for message in rig.said if message.get("WATCHDOG") == "1"]
+        armed = rig.folder / "run" / "armed"
+        assert armed.exists()
         rig.set_parameters(GUID_TIMEOUT=_GUIDED_TIMEOUT_S, FS_GCS_TIMEOUT=10.0)
         await asyncio.sleep(0.2)
         killed_s = rig.kill()
         await first.wait()
+        assert armed.exists(), "the vehicle flies on"
         (log,) = rig.flights.rglob("flight.mcap")
 
         await asyncio.sleep(_GUIDED_TIMEOUT_S + 1.0)
@@ -64,6 +67,7 @@ async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp
         third = await rig.start()
         waiting = await rig.until(lambda status: status.reason == _FIT or status.phase is not Phase.PREFLIGHT)
         assert waiting.phase is Phase.PREFLIGHT
+        assert not armed.exists()
         third.send_signal(signal.SIGTERM)
         assert await asyncio.wait_for(third.wait(), 30) == 128 + signal.SIGTERM
 
