@@ -62,7 +62,7 @@ def deliver(
     except FlightBeganError as err:
         stopped = str(err)
     if as_json:
-        print(json.dumps({**asdict(done), "stopped": stopped}))
+        print(json.dumps(asdict(done) | ({"stopped": stopped} if unless else {})))
         return
     print(
         f"{done.looks} looks delivered, {done.changed} changed, {done.already} were there already; "
@@ -101,7 +101,7 @@ def prune(
     except FlightBeganError as err:
         stopped = str(err)
     if as_json:
-        print(json.dumps({**asdict(pruned), "stopped": stopped}))
+        print(json.dumps(asdict(pruned) | ({"stopped": stopped} if unless else {})))
         return
     kept = f"; {pruned.stay} older looks are not in the store and stay" if pruned.stay else ""
     print(f"{pruned.looks} looks and {pruned.pictures} pictures taken away{kept}")
