@@ -47,8 +47,9 @@ _SHARED_S = 0.02
 """Most that the delay believed moves at once."""
 
 
-_TILT, _ALL = slice(2), slice(3)
+_MODELS, _TILT = slice(None), slice(2)
 """Of the axes of an answer, which are roll, pitch and yaw."""
+_COUNT: Matrix = np.arange(_MOST_STEPS + 1.0)
 
 
 class _Kept:
@@ -71,18 +72,23 @@ class _Kept:
         self._times[self._count], self._answers[self._count] = now_ns, answer
         self._count += 1
 
-    def at(self, times_ns: Matrix, axes: slice) -> Matrix:
-        """(N, models, axes) the undelayed answers at (N,) times; beyond what is kept its first and last."""
-        times, answers = self._times[: self._count], self._answers[: self._count, :, axes]
+    def at(self, times_ns: Matrix, *of: int | slice) -> Matrix:
+        """(N, ...) the undelayed answers at (N,) times, `of` a model or these models and axes; beyond what is
+        kept its first and last."""
+        times = self._times[: self._count]
         after = times.searchsorted(times_ns)
         np.maximum(
             np.minimum(after, self._count - 1, out=after), 1, out=after
         )  # np.clip takes five times as long
         earlier = after - 1
-        before, old_ns = answers[earlier], times[earlier]
+        old_ns = times[earlier]
         share = (times_ns - old_ns) / (times[after] - old_ns)
         np.maximum(np.minimum(share, 1.0, out=share), 0.0, out=share)
-        between: Matrix = before + share[:, None, None] * (answers[after] - before)
+        before = self._answers.take(earlier, axis=0)[:, *of]
+        between: Matrix = self._answers.take(after, axis=0)[:, *of]
+        between -= before
+        between *= share.reshape(-1, *[1] * (between.ndim - 1))
+        between += before
         return between
 
 
@@ -152,20 +158,21 @@ class AttitudeResponse:
         steps = min(math.ceil(ahead_ns * 1e-9 / _STEP_S), _MOST_STEPS)
         if steps <= 0 or told.stamp_ns < self._kept.oldest_ns:
             return []
-        after_ns = np.linspace(0.0, ahead_ns, steps + 1)
+        after_ns = _COUNT[: steps + 1] * (ahead_ns / steps)
+        after_ns[-1] = ahead_ns
         sent_ns = told.stamp_ns + after_ns - self.delay_s * 1e9
-        answers = self._kept.at(sent_ns, _ALL)[:, self._model]
-        to_come = sent_ns > now_ns
-        answers[to_come, _TILT] = self._to_come((sent_ns[to_come, None] - now_ns) * 1e-9)
-        gained = answers - answers[0]
+        answers = self._kept.at(sent_ns, self._model)
+        to_come = int(sent_ns.searchsorted(now_ns, side="right"))
+        answers[to_come:, _TILT] = self._to_come((sent_ns[to_come:, None] - now_ns) * 1e-9)
+        gained = (answers - answers[0]).tolist()
         return [
             Attitude(
-                told.stamp_ns + round(float(after)),
-                told.roll_rad + float(roll),
-                told.pitch_rad + float(pitch),
-                wrap_pi(told.yaw_rad + float(yaw)),
+                told.stamp_ns + round(after),
+                told.roll_rad + roll,
+                told.pitch_rad + pitch,
+                wrap_pi(told.yaw_rad + yaw),
             )
-            for after, (roll, pitch, yaw) in zip(after_ns[1:], gained[1:], strict=True)
+            for after, (roll, pitch, yaw) in zip(after_ns[1:].tolist(), gained[1:], strict=True)
         ]
 
     # How
@@ -185,10 +192,12 @@ class AttitudeResponse:
     def _to_come(self, after_s: Matrix) -> Matrix:
         """(N, 2) roll and pitch, undelayed, (N, 1) seconds after the newest answer."""
         answer, speed = self._answer[self._model, _TILT], self._speed[self._model, _TILT]
+        if not len(after_s):
+            return np.zeros((0, 2))
         return self._wanted + _settled(answer - self._wanted, speed, self.bandwidth_radps, after_s)[0]
 
     def _learn(self, sample: Attitude, dt_s: float) -> None:
-        answers = self._kept.at(sample.stamp_ns - _DELAYS_NS, _TILT)
+        answers = self._kept.at(sample.stamp_ns - _DELAYS_NS, _MODELS, _TILT)
         errors = np.array([sample.roll_rad, sample.pitch_rad]) - answers
         self._settled_s += dt_s
         self._steady += min(dt_s / min(_STEADY_S, self._settled_s), 1.0) * (errors - self._steady)
