@@ -1,7 +1,8 @@
 """How much of the machine a test that flies by the clock had for itself, and whether that was enough.
 
 A process beside the test counts what the processors did for others than the test and its children, and how
-late a short timer came.  Only others' work excuses a failure: what the test itself burns never does."""
+late a short timer came.  Only others' work excuses a failure: what the test itself burns never does, nor what
+gives way to it, for it is niced."""
 
 from __future__ import annotations
 
@@ -21,6 +22,7 @@ CALIBRATION_S = 0.5
 BEAT_S = 0.02
 _SAMPLE_BEATS = 20
 _TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
+_STAT = Path("/proc/stat")
 
 
 @dataclass(frozen=True)
@@ -109,11 +111,12 @@ class _Family:
 
     def __init__(self, root: int) -> None:
         self._members = {root}
+        self._niced: set[int] = set()
         self._used: dict[int, float] = {}
 
-    def used_s(self) -> float:
-        """Processor time of all its members so far; what was used since the last look by one that is gone
-        is missing."""
+    def used_s(self) -> tuple[float, float]:
+        """Processor time of all its members so far, and of those that are not niced; what was used since the
+        last look by one that is gone is missing."""
         parents: dict[int, int] = {}
         times: dict[int, float] = {}
         for folder in Path("/proc").iterdir():
@@ -122,6 +125,8 @@ class _Family:
                     fields = (folder / "stat").read_text().rpartition(")")[2].split()
                     pid = int(folder.name)
                     parents[pid], times[pid] = int(fields[1]), (int(fields[11]) + int(fields[12])) * _TICK_S
+                    if int(fields[16]) > 0:
+                        self._niced.add(pid)
         found = True
         while found:
             found = False
@@ -130,17 +135,18 @@ class _Family:
                     self._members.add(pid)
                     found = True
         self._used |= {pid: times[pid] for pid in self._members & times.keys()}
-        return sum(self._used.values())
+        return sum(self._used.values()), sum(self._used[pid] for pid in self._used.keys() - self._niced)
 
 
-def _busy_s(cores: set[int]) -> float:
-    """Time for which these processors did anything, or were not given to this machine."""
+def busy_s(stat: str, cores: set[int], *, niced: bool) -> float:
+    """Time for which these processors did anything, what is `niced` only if so, or were not given to this
+    machine, by what /proc/stat says."""
     busy = 0
-    for line in Path("/proc/stat").read_text().splitlines():
+    for line in stat.splitlines():
         name, *counts = line.split()
         if name.startswith("cpu") and name[3:].isdigit() and int(name[3:]) in cores:
             user, nice, system, _, _, irq, softirq, steal = map(int, counts[:8])
-            busy += user + nice + system + irq + softirq + steal
+            busy += user + nice * niced + system + irq + softirq + steal
     return busy * _TICK_S
 
 
@@ -148,7 +154,8 @@ def _measure(root: int) -> Load:
     """Until the standard input says something."""
     cores = os.sched_getaffinity(0)
     family = _Family(root)
-    used_s, busy_s, began_s = family.used_s(), _busy_s(cores), time.monotonic()
+    niced = os.getpriority(os.PRIO_PROCESS, 0) > 0  # what is niced gives way to none that is
+    (used_s, urgent_s), began, began_s = family.used_s(), _STAT.read_text(), time.monotonic()
     print(flush=True)
     pause_s, beats = 0.0, 0
     while True:
@@ -160,8 +167,11 @@ def _measure(root: int) -> Load:
         if beats % _SAMPLE_BEATS == 0:
             family.used_s()
     seconds = time.monotonic() - began_s
-    used_s, busy_s = family.used_s() - used_s, _busy_s(cores) - busy_s
-    taken_cores = min(max(busy_s - used_s, 0.0) / seconds, len(cores))  # the counters are coarse
+    all_s, of_it_urgent_s = family.used_s()
+    used_s, urgent_s = all_s - used_s, of_it_urgent_s - urgent_s
+    taken_s = busy_s(_STAT.read_text(), cores, niced=niced) - busy_s(began, cores, niced=niced)
+    taken_s -= used_s if niced else urgent_s
+    taken_cores = min(max(taken_s, 0.0) / seconds, len(cores))  # the counters are coarse
     return Load(seconds, len(cores), used_s / seconds, taken_cores, pause_s)
 
 

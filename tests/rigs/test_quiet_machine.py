@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.rigs.machine import Load, Meter, Needs
+from tests.rigs.machine import Load, Meter, Needs, busy_s
 
 ROOT = Path(__file__).parents[2]
 BURN_S = 0.4
@@ -32,6 +32,14 @@ def test_what_others_took_and_how_long_all_stood_still_are_named(
 
 def test_what_the_test_itself_burns_is_no_excuse() -> None:
     assert not Needs(cores=1.5).missing(Load(10.0, 2, used_cores=2.0, taken_cores=0.0, pause_s=0.4))
+
+
+def test_what_is_niced_gives_way_but_to_what_is_niced_itself() -> None:
+    """The columns of a processor: user, nice, system, idle, iowait, irq, softirq, steal."""
+    stat = "cpu 0 0 0 0 0 0 0 0\ncpu0 100 400 20 9 9 3 2 5 0 0\ncpu7 1 1 1 1 1 1 1 1 0 0\nintr 5\n"
+    ticks_per_s = os.sysconf("SC_CLK_TCK")
+    assert busy_s(stat, {0}, niced=False) * ticks_per_s == pytest.approx(130)
+    assert busy_s(stat, {0}, niced=True) * ticks_per_s == pytest.approx(530)
 
 
 def test_what_the_test_and_its_children_use_counts_as_its_own() -> None:
