@@ -20,10 +20,11 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import Wind, WindParams
 from flightd.site.corridor import Corridor
 from flightd.site.site_file import load_site
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 
 CONFIGS = Path(__file__).parents[3] / "configs"
-CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission={"dwell_s": 0.5})
+CONFIG = load_config(CONFIGS / "sim.toml").with_values(mission=BRISK)
 SITE = load_site(CONFIGS / "site-demo.toml")
 SEEDS = range(1, 1 + int(os.environ.get("FLIGHTD_SEEDS", "1")))
 BODY_M = 0.3

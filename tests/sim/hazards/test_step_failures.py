@@ -7,6 +7,7 @@ a fixed seed.
 
 from __future__ import annotations
 
+import cProfile
 import gc
 import itertools
 import math
@@ -117,23 +118,18 @@ def reached() -> dict[str, tuple[CodeType, list[float]]]:
     """The public functions that the steps of a whole flight call once it is armed, by name, with the times
     since then."""
     found = dict[CodeType, list[float]]()
-    now, armed_ns = set[CodeType](), list[int]()
-
-    def note(frame: FrameType, event: str, _: Any) -> None:
-        if event == "call":
-            now.add(frame.f_code)
-
+    armed_ns = list[int]()
     flight = short_flight()
     step = flight.pilot.step
 
     def noted(tick: TickInput) -> TickOutput:
-        now.clear()
-        with profiled(note):
-            output = step(tick)
-        if tick.vehicle is not None and tick.vehicle.armed:
-            armed_ns[:] = armed_ns or [tick.now_ns]
-            for code in now:
-                found.setdefault(code, []).append((tick.now_ns - armed_ns[0]) * 1e-9)
+        if tick.vehicle is None or not tick.vehicle.armed:
+            return step(tick)
+        armed_ns[:] = armed_ns or [tick.now_ns]
+        calls = cProfile.Profile(builtins=False)  # notes them a few times as fast as a function of ours
+        output: TickOutput = calls.runcall(step, tick)
+        for code in {entry.code for entry in calls.getstats() if isinstance(entry.code, CodeType)}:
+            found.setdefault(code, []).append((tick.now_ns - armed_ns[0]) * 1e-9)
         return output
 
     flight.pilot.step = noted  # type: ignore[method-assign]

@@ -58,7 +58,10 @@ from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
 
 STEP_NS = 5_000_000
 TICK_NS = 20_000_000
-FRAME_NS = 33_333_333
+FRAME_NS = 50_000_000
+"""As often as the small camera of the flights by pixels."""
+ATTITUDE_NS = 20_000_000
+"""As often as an adapter asks an autopilot for it."""
 FRONT_NS = 250_000_000
 READING_NS = 150_000_000
 
@@ -140,6 +143,7 @@ class IdealFlight:
         self._looked: deque[tuple[int, CodeSet]] = deque()
         self._exposed: deque[Kinematics] = deque()
         self._front_ns = 0
+        self.frame_ns = FRAME_NS
         world = world or site
         x_m, y_m = world.pad_centre(world.home)
         if carried_to:
@@ -215,14 +219,14 @@ class IdealFlight:
             self._now_ns += STEP_NS
             if self.link is None:
                 self._step(setpoints.newest)
-                if self._now_ns % 10_000_000 == 0 and not self.faults.silent:
+                if self._now_ns % ATTITUDE_NS == 0 and not self.faults.silent:
                     vehicle.samples.append(self._attitude())
             else:
                 self.link.step(self._now_ns, setpoints.newest, armed=self._armed)
                 self._step(self.link.obeyed if setpoints.newest is not None else None)
                 vehicle.samples += self.link.attitudes()
             if self._now_ns >= frame_ns:
-                frame_ns += FRAME_NS
+                frame_ns += self.frame_ns
                 seq += 1
                 if not self.faults.blind:
                     late_ns = self.faults.late_ns + round(self._jitter.random() * self._jitter_s * 1e9)
