@@ -1,6 +1,6 @@
 """Random walks of a whole mission: whatever comes, in whatever order, some things always hold.
 
-FLIGHTD_WALKS says how many walks are tried (120 where it is not set)."""
+FLIGHTD_WALKS says how many walks are tried (80 where it is not set)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from flightd.mission.machine import STATES, TABLE, Cause, Intent, State
 from tests.unit.mission.driven import Flight
 from tests.unit.mission.states import PARAMS, flight_of, fresh, losing
 
-WALKS = int(os.environ.get("FLIGHTD_WALKS", "120"))
+WALKS = int(os.environ.get("FLIGHTD_WALKS", "80"))
 
 SENSED: Mapping[str, Mapping[str, Any]] = {
     "well": {},
