@@ -200,7 +200,7 @@ class LineTracker:
         view = self._view(attitude, stamp_ns, height_m, self._lens)
         by_width_m = heights_by_width(lines.lines, view, self._line_width_m)
         off_share = self._filter.mean(HEIGHT) + self._filter.mean(HEIGHT_SCALE)
-        height_m = self._widths.believed_m(by_width_m, height_m) * (1.0 + off_share)
+        height_m = self._widths.believed_m(by_width_m, height_m, stamp_ns) * (1.0 + off_share)
         if not height_m > 0:
             self.rejected += 1
             return False

@@ -6,17 +6,19 @@ import math
 from collections.abc import Sequence
 from statistics import median
 
-_GAIN = 0.15
+_MEMORY_S = 0.2
+_LONGEST_S = 0.2
+"""A frame that comes later after the last one counts as if it came so late."""
 _AGREEING, _DOUBTED = 0.15, 0.2
-_STEADY = 0.06
-"""Lines whose widths tell heights that change by more from frame to frame (share) are none of the map; a fast
-climb changes them by less."""
-_LEAP = 0.1
-"""A height by widths that leaps by more from one frame to the next (share) is another line's."""
-_STEADY_FRAMES, _STEADY_SHARE = 30, 0.08
-"""Widths that never agreed with the height are held against it, too, once they were so many frames the same
-share of it, within so much on average: a range finder that reads too little from the floor on."""
-_OTHER_FRAMES = 90
+_STEADY, _STEADY_PER_S = 0.03, 0.9
+"""Lines whose widths tell heights that change by more from frame to frame (share, and share a second between
+them) are none of the map; a fast climb changes them by less."""
+_LEAP, _LEAP_PER_S = 0.04, 1.8
+"""A height by widths that leaps by more from one frame to the next is another line's."""
+_STEADY_S, _STEADY_SHARE = 0.95, 0.08
+"""Widths that never agreed with the height are held against it, too, once they were so long the same share
+of it, within so much on average: a range finder that reads too little from the floor on."""
+_OTHER_S = 2.95
 """The same for a line of another width than those before it, of which no range finder can be the cause."""
 
 
@@ -27,6 +29,7 @@ class WidthHeights:
         self._share = 1.0
         self._changes = 0.0
         self._last_m: float | None = None
+        self._stamp_ns = 0
         self._judged = False
         self._followed = False  # by its widths, from frame to frame, since it last agreed with the one told
         self._watched = _Watched()
@@ -38,22 +41,22 @@ class WidthHeights:
     def share(self) -> float:
         """The height told lately against that by the width: near 1 while they agree, 1 while the widths do
         not agree with each other."""
-        return self._share if self._changes < _STEADY else 1.0
+        return self._share if self._changes < 1.0 else 1.0
 
     @property
     def tell(self) -> bool:
         """The newest frame's widths could be held against a height, and lately they agree with each other."""
-        return self.by_width_m is not None and self._changes < _STEADY
+        return self.by_width_m is not None and self._changes < 1.0
 
     @property
     def off_m(self) -> float:
         """How much higher the height was told last than the widths have it, by that share, m."""
         return self._told_m - self._told_m / self.share
 
-    def believed_m(self, by_width_m: Sequence[float], told_m: float) -> float:
-        """The height `told_m`, unless there is none or the heights of this frame's lines by their widths
-        contradict it for long: then theirs.  Theirs at once where they go on as before and what is told
-        leaps away from them."""
+    def believed_m(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int) -> float:
+        """The height `told_m` of a frame exposed at `stamp_ns`, unless there is none or the heights of its
+        lines by their widths contradict it for long: then theirs.  Theirs at once where they go on as before
+        and what is told leaps away from them."""
         self.by_width_m = None
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
@@ -64,20 +67,23 @@ class WidthHeights:
             nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
         share = told_m / nearest_m
         change = self._change(nearest_m, share)
-        if agrees or (self._judged and change < _LEAP):
+        dt_s = min((stamp_ns - self._stamp_ns) * 1e-9, _LONGEST_S)
+        gain = 1.0 - math.exp(-dt_s / _MEMORY_S)
+        self._stamp_ns = stamp_ns
+        goes_on = change < _LEAP + _LEAP_PER_S * dt_s
+        if agrees or (self._judged and goes_on):
             if not self._judged:
                 self._judged, self._share = True, 1.0
             self._watched = _Watched()
         else:
-            frames = _OTHER_FRAMES if self._judged else _STEADY_FRAMES
-            steady_share = self._watched.steady_share(share, frames)
+            steady_share = self._watched.steady_share(share, dt_s, _OTHER_S if self._judged else _STEADY_S)
             if steady_share is None:  # then it is the line that is another
                 return told_m / self._believed_share
             self._judged, self._share, self._watched = True, steady_share, _Watched()
-        self._share += _GAIN * (share - self._share)
+        self._share += gain * (share - self._share)
         if self._last_m is not None:
-            self._changes += _GAIN * (change - self._changes)
-            self._followed = agrees or (self._followed and change < _LEAP)
+            self._changes += gain * (change / (_STEADY + _STEADY_PER_S * dt_s) - self._changes)
+            self._followed = agrees or (self._followed and goes_on)
         self._last_m = self.by_width_m = nearest_m
         self._told_m = told_m
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
@@ -101,14 +107,15 @@ class _Watched:
     """The share of the height by widths as which one is told, of lines that are not believed yet."""
 
     def __init__(self) -> None:
-        self._frames = 0
+        self._lasted_s = 0.0
         self._mean: float | None = None
         self._strays = 0.0
 
-    def steady_share(self, share: float, frames: int) -> float | None:
-        """Take one frame's; None until it was the same over so many `frames`."""
+    def steady_share(self, share: float, dt_s: float, needed_s: float) -> float | None:
+        """Take one frame's, `dt_s` after the last; None until it was the same for so long."""
         mean = share if self._mean is None else self._mean
-        self._frames += 1
-        self._mean = mean + _GAIN * (share - mean)
-        self._strays += _GAIN * (abs(share / mean - 1.0) - self._strays)
-        return self._mean if self._frames >= frames and self._strays < _STEADY_SHARE else None
+        gain = 1.0 - math.exp(-dt_s / _MEMORY_S)
+        self._lasted_s += dt_s
+        self._mean = mean + gain * (share - mean)
+        self._strays += gain * (abs(share / mean - 1.0) - self._strays)
+        return self._mean if self._lasted_s >= needed_s and self._strays < _STEADY_SHARE else None

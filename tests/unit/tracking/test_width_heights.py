@@ -3,108 +3,143 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 
 import pytest
 
 from flightd.tracking.width_heights import WidthHeights
 
 
+class Frames(WidthHeights):
+    """So many frames a second."""
+
+    def __init__(self, fps: float = 30.0) -> None:
+        super().__init__()
+        self._period_ns, self._at_ns = round(1e9 / fps), 0
+
+    def sees(self, by_width_m: Sequence[float], told_m: float) -> float:
+        """What is believed of the next frame."""
+        self._at_ns += self._period_ns
+        return self.believed_m(by_width_m, told_m, self._at_ns)
+
+
 def test_a_height_that_all_widths_contradict_is_theirs() -> None:
-    heights = WidthHeights()
+    heights = Frames()
     for _ in range(30):
-        assert heights.believed_m([1.6], 1.62) == 1.62
-    told = [heights.believed_m([1.6], 2.4) for _ in range(90)]
+        assert heights.sees([1.6], 1.62) == 1.62
+    told = [heights.sees([1.6], 2.4) for _ in range(90)]
     assert told[-1] == 1.6
     assert heights.share == pytest.approx(1.5, abs=0.05)
 
 
 def test_widths_that_contradict_each_other_tell_no_height() -> None:
     """Boards and boxes at the edge of the picture, taken for lines now and then."""
-    heights, rng = WidthHeights(), random.Random(3)
+    heights, rng = Frames(), random.Random(3)
     for _ in range(30):
-        heights.believed_m([1.6], 1.6)
+        heights.sees([1.6], 1.6)
     for _ in range(120):
         false = [rng.uniform(0.35, 1.3)]
-        assert heights.believed_m(false, 1.6) == 1.6
+        assert heights.sees(false, 1.6) == 1.6
         assert heights.share == 1.0
 
 
 def test_a_range_finder_that_swings_is_contradicted_by_a_steady_width() -> None:
-    heights = WidthHeights()
+    heights = Frames()
     for n in range(90):
-        heights.believed_m([1.6], 1.6 if n < 30 else (0.5 if n % 2 else 1.6))
+        heights.sees([1.6], 1.6 if n < 30 else (0.5 if n % 2 else 1.6))
     assert heights.share < 0.85
 
 
 def test_without_widths_a_contradicted_height_is_put_right_by_what_they_said() -> None:
-    heights = WidthHeights()
+    heights = Frames()
     for n in range(120):
-        heights.believed_m([1.6], 1.6 if n < 30 else 2.4)
-    assert heights.believed_m([], 1.2) == pytest.approx(0.8, abs=0.02)
+        heights.sees([1.6], 1.6 if n < 30 else 2.4)
+    assert heights.sees([], 1.2) == pytest.approx(0.8, abs=0.02)
 
 
 def test_one_width_that_agrees_is_enough_and_none_at_all_changes_nothing() -> None:
-    heights = WidthHeights()
+    heights = Frames()
     for _ in range(60):
-        assert heights.believed_m([0.5, 1.6, 3.0], 1.62) == 1.62
-    assert heights.believed_m([], 1.62) == 1.62
-    assert heights.believed_m([1.5, 1.6, 1.7], float("nan")) == 1.6
+        assert heights.sees([0.5, 1.6, 3.0], 1.62) == 1.62
+    assert heights.sees([], 1.62) == 1.62
+    assert heights.sees([1.5, 1.6, 1.7], float("nan")) == 1.6
 
 
 def test_a_height_that_leaps_away_from_a_width_is_not_believed_for_one_frame() -> None:
-    heights = WidthHeights()
+    heights = Frames()
     for _ in range(30):
-        heights.believed_m([1.6], 1.6)
-    assert heights.believed_m([1.59], 0.9) == 1.59
-    assert heights.believed_m([1.58], 1.58) == 1.58
+        heights.sees([1.6], 1.6)
+    assert heights.sees([1.59], 0.9) == 1.59
+    assert heights.sees([1.58], 1.58) == 1.58
 
 
 def test_a_line_of_another_width_does_not_contradict_the_height_at_once() -> None:
-    heights = WidthHeights()
+    heights = Frames()
     for _ in range(30):
-        heights.believed_m([1.6], 1.6)
-    assert heights.believed_m([0.8], 1.6) == 1.6
-    assert heights.believed_m([0.8], 1.6) == 1.6
+        heights.sees([1.6], 1.6)
+    assert heights.sees([0.8], 1.6) == 1.6
+    assert heights.sees([0.8], 1.6) == 1.6
 
 
 def test_an_old_line_of_half_the_width_that_is_seen_alone_is_no_height() -> None:
     """As long as it takes to fly over it: what the picture moves by would be doubled."""
-    heights = WidthHeights()
+    heights = Frames()
     for _ in range(30):
-        heights.believed_m([1.6], 1.6)
+        heights.sees([1.6], 1.6)
     for _ in range(45):
-        assert heights.believed_m([3.25], 1.6) == 1.6
+        assert heights.sees([3.25], 1.6) == 1.6
         assert heights.share == 1.0
-    assert heights.believed_m([1.6, 3.25], 1.6) == 1.6
+    assert heights.sees([1.6, 3.25], 1.6) == 1.6
 
 
 def test_a_width_after_a_climb_that_nobody_saw_is_held_against_the_height_at_once() -> None:
     """Blind for a while: both have changed alike, the range finder reads too much as before."""
-    heights = WidthHeights()
+    heights = Frames()
     for n in range(120):
-        heights.believed_m([1.0], 1.0 if n < 30 else 1.5)
-    assert heights.believed_m([1.6], 2.4) == pytest.approx(1.6, abs=0.02)
+        heights.sees([1.0], 1.0 if n < 30 else 1.5)
+    assert heights.sees([1.6], 2.4) == pytest.approx(1.6, abs=0.02)
 
 
 def test_once_contradicted_a_width_is_not_taken_for_being_nearer_to_what_is_wrong() -> None:
-    heights = WidthHeights()
+    heights = Frames()
     for _ in range(30):
-        heights.believed_m([1.6, 1.45], 1.6)
+        heights.sees([1.6, 1.45], 1.6)
     for n in range(30):
-        assert heights.believed_m([1.6, 1.45 - 0.01 * n], 0.9) == 1.6
+        assert heights.sees([1.6, 1.45 - 0.01 * n], 0.9) == 1.6
 
 
 def test_widths_that_never_agreed_contradict_a_height_that_is_always_the_same_share_of_theirs() -> None:
-    heights = WidthHeights()
+    heights = Frames()
     for n in range(40):
         true_m = 0.3 + 0.03 * n
-        heights.believed_m([true_m], 0.8 * true_m)
+        heights.sees([true_m], 0.8 * true_m)
     assert heights.share == pytest.approx(0.8, abs=0.03)
     assert heights.off_m == pytest.approx(-0.2 * true_m, abs=0.06)
 
 
 def test_false_widths_before_the_first_true_one_contradict_nothing() -> None:
-    heights, rng = WidthHeights(), random.Random(5)
+    heights, rng = Frames(), random.Random(5)
     for _ in range(90):
-        heights.believed_m([rng.uniform(0.35, 1.0)], 1.6)
+        heights.sees([rng.uniform(0.35, 1.0)], 1.6)
     assert (heights.share, heights.off_m) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize("fps", [12.0, 15.0, 20.0, 30.0, 60.0])
+def test_a_height_that_stuck_near_the_floor_is_contradicted_as_soon_by_a_slow_camera(fps: float) -> None:
+    """From one of its pictures to the next the width of a line changes by more than a tenth."""
+    heights = Frames(fps)
+    true_m = 0.4
+    while heights.share > 0.6:
+        assert true_m < 1.2
+        heights.sees([true_m], min(true_m, 0.45))
+        true_m += 0.8 / fps
+
+
+@pytest.mark.parametrize("fps", [10.0, 20.0, 60.0])
+def test_false_widths_contradict_nothing_however_many_frames_there_are(fps: float) -> None:
+    heights, rng = Frames(fps), random.Random(7)
+    for _ in range(round(fps)):
+        heights.sees([1.6], 1.6)
+    for _ in range(round(4 * fps)):
+        assert heights.sees([rng.uniform(0.35, 1.3)], 1.6) == 1.6
+        assert heights.share == 1.0
