@@ -7,10 +7,11 @@ be read so itself is less sure.
 
 from __future__ import annotations
 
-import calendar
+import math
 import re
 from collections.abc import Iterator, Sequence
-from datetime import date, datetime
+from dataclasses import dataclass, replace
+from datetime import date
 from decimal import Decimal
 from itertools import product
 from typing import Final
@@ -18,6 +19,7 @@ from typing import Final
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.label_text import TextLine, TextLook
 from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource, told_text
+from flightd.vision.shelf.date_text import date_goes_on, day_of, respaced
 
 _ALIKE: Final = {character: group for group in ("O0", "Il1") for character in group}
 _MOST_READINGS: Final = 4096
@@ -61,49 +63,109 @@ def _value(line: TextLine, pattern: LabelTextConfig) -> LabelValue | None:
     return LabelValue(ValueKind(pattern.kind), told_text(first), "", ValueSource.TEXT, round(confidence, 4))
 
 
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Where in a line a value was found: its part of the `reading` that told it, and its end in the line as the
+    pattern takes it, `shown`.  A `whole` one can have lost nothing at its ends."""
+
+    start: int
+    end: int
+    reading: str
+    shown: str
+    shown_end: int
+    whole: bool = False
+
+
 def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> tuple[Told | None, float]:
     """The value of one look with the probability of its least sure character; 0 where it can mean something
     else, or may go on beyond what was read."""
-    if len(look.text) > _LONGEST:
-        return None, 0.0
-    meant: dict[Told, tuple[int, int, str]] = {}
-    searched = re.compile(pattern.pattern)
-    spaced = _readings(look.text)
-    if spaced is None:
-        return None, 0.0
-    for reading in spaced:
-        match = searched.search(reading)
-        if match is not None and not _goes_on(reading, match):
-            for value in _meanings(match[1], pattern):
-                meant.setdefault(value, (*match.span(1), match[1]))
+    meant = _meant(look.text, pattern)
     if not meant:
         return None, 0.0
-    value, (start, end, reading) = next(iter(meant.items()))
-    more_right = (line.gap or (line.open_right and end == len(look.text))) and _fits_longer(
-        look.text, end, pattern
+    value, found = next(iter(meant.items()))
+    more_right = (line.gap or (line.open_right and found.end == len(look.text))) and _fits_longer(
+        found.shown, found.shown_end, pattern
     )
-    more_left = line.open_left and start == 0 and _fits_longer(look.text, 0, pattern)
+    more_left = line.open_left and found.start == 0 and _fits_longer(found.shown, 0, pattern)
     if len(meant) > 1 or more_right or more_left:
         return value, 0.0
-    part = (_REPAIRED if look.text[start:end] != reading else 1.0) * (1.0 - _LOST_TO_GLARE * line.glare)
-    touching = look.text[end : end + 1].strip()  # what is left of another character of the value, perhaps
-    return value, min(look.sure[start : end + len(touching)]) * part
+    repaired = look.text[found.start : found.end] != found.reading[found.start : found.end]
+    part = (_REPAIRED if repaired else 1.0) * (1.0 - _LOST_TO_GLARE * line.glare)
+    # what is left of another character of the value, perhaps
+    touching = "" if found.whole else look.text[found.end : found.end + 1].strip()
+    end = found.end + len(touching)
+    told = [
+        sure
+        for character, sure in zip(look.text[found.start : end], look.sure[found.start : end], strict=True)
+        if character.isalnum() or not found.whole
+    ]
+    return value, min(told) * part
 
 
-def _readings(text: str) -> Iterator[str] | None:
-    """Every text that looks like this one, itself first; None where there are too many."""
+def _meant(text: str, pattern: LabelTextConfig) -> dict[Told, _Found]:
+    """Everything that a text can mean, as it stands there; else, for a date, with other separators."""
+    readings = _readings(text, pattern) if len(text) <= _LONGEST else []
+    meant: dict[Told, _Found] = {}
+    for reading in readings:
+        for value, found in _as_it_stands(reading, pattern):
+            meant.setdefault(value, found)
+    if meant or not pattern.is_date:
+        return meant
+    for reading in readings:
+        for value, found in _respaced(reading, pattern):
+            meant.setdefault(value, found)
+    return meant
+
+
+def _readings(text: str, pattern: LabelTextConfig) -> list[str]:
+    """Every text that looks like this one, itself first; none where there are too many."""
     choices = [character + _ALIKE.get(character, "").replace(character, "") for character in text]
-    count = 1
-    for choice in choices:
-        count *= len(choice)
-    return None if count > _MOST_READINGS else map("".join, product(*choices))
+    if pattern.is_date:  # where a digit beside a digit is one
+        beside = [
+            re.search(r"\d", text[max(0, at - 1) : at] + text[at + 1 : at + 2]) for at in range(len(text))
+        ]
+        choices = [
+            text[at] if text[at].isdigit() and beside[at] else choice for at, choice in enumerate(choices)
+        ]
+    return [] if math.prod(map(len, choices)) > _MOST_READINGS else list(map("".join, product(*choices)))
 
 
-def _goes_on(text: str, match: re.Match[str]) -> bool:
-    """Whether the value is a part of a longer word."""
+def _as_it_stands(reading: str, pattern: LabelTextConfig) -> Iterator[tuple[Told, _Found]]:
+    """What the pattern finds in a reading, but in a part of a longer word."""
+    match = re.search(pattern.pattern, reading)
+    if match is None or match[1] is None:
+        return
     start, end = match.span(1)
-    before = start > 0 and match.start() == start and text[start - 1].isalnum()
-    return before or (end < len(text) and text[end].isalnum())
+    before = reading[start - 1 : start] if start and start == match.start() else ""
+    after = reading[end : end + 1]
+    found = _Found(start, end, reading, reading, end)
+    if pattern.is_date:
+        for form in pattern.dates:
+            day = day_of(match[1].strip(), form)
+            if day is not None and not date_goes_on(before, match[1], after, form):
+                yield day, replace(found, whole="%Y" in form)
+    elif not before.isalnum() and not after.isalnum():
+        yield from ((value, found) for value in _meanings(match[1], pattern))
+
+
+def _respaced(reading: str, pattern: LabelTextConfig) -> Iterator[tuple[date, _Found]]:
+    """Dates that the pattern finds in a reading once their separators are as their format has them."""
+    for form in pattern.dates:
+        other = respaced(reading, form)
+        if other is None:
+            continue
+        start, end = other.start, other.end
+        line = reading[:start] + other.shown + reading[end:]
+        shown_end = start + len(other.shown)
+        match = re.search(pattern.pattern, line)
+        if match is None or match.span(1) != (start, shown_end):
+            continue
+        if other.lost and line[: match.start()].strip():  # `02 2021 0808` is a telephone number
+            continue
+        day = day_of(other.shown, form)
+        before = reading[start - 1 : start] if start and start == match.start() else ""
+        if day is not None and not date_goes_on(before, other.shown, reading[end : end + 1], form):
+            yield day, _Found(start, end, reading, line, shown_end, "%Y" in form)
 
 
 def _fits_longer(text: str, at: int, pattern: LabelTextConfig) -> bool:
@@ -120,17 +182,7 @@ def _meanings(text: str | None, pattern: LabelTextConfig) -> set[Told]:
     """What the group of a pattern can be; several for a date that its formats take differently."""
     bare = (text or "").strip()
     if pattern.is_date:
-        return {day for form in pattern.dates if (day := _day(bare, form)) is not None}
+        return {day for form in pattern.dates if (day := day_of(bare, form)) is not None}
     if ValueKind(pattern.kind) is ValueKind.QUANTITY:
         return {Decimal(bare)} if bare.isascii() and bare.isdecimal() else set()
     return {bare} if bare else set()
-
-
-def _day(text: str, form: str) -> date | None:
-    try:
-        found = datetime.strptime(text, form).date()  # noqa: DTZ007 - a date alone
-    except ValueError:
-        return None
-    if "%d" in form or "%j" in form:
-        return found
-    return found.replace(day=calendar.monthrange(found.year, found.month)[1])
