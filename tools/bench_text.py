@@ -21,7 +21,7 @@ import numpy as np
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.label_values import LEAST_TEXT_CONFIDENCE, told_text
 from flightd.vision.shelf.text_reader import TextReader
-from flightd.vision.shelf.text_values import text_values
+from flightd.vision.shelf.text_values import text_values, worth_another
 from tools.label_drawing import Seen, fonts, label
 
 _LETTERS, _ALL = "ABCDEFGHJKLMNPQRSTUVWXYZ", "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -76,7 +76,11 @@ def outcomes(labels: int, seed: int, heights: list[int], letters: str) -> Iterat
         cap_px, truth = heights[number % len(heights)], _Truth.drawn(rng, letters)
         font = names[number // len(heights) % len(names)]
         values = text_values(
-            reader.read(label(truth.lines, font, cap_px, Seen.drawn(rng, cap_px), rng)), asked
+            reader.read(
+                label(truth.lines, font, cap_px, Seen.drawn(rng, cap_px), rng),
+                lambda looks: worth_another(looks, asked),
+            ),
+            asked,
         )
         for kind, text in truth.values.items():
             sure = {

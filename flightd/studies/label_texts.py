@@ -16,7 +16,7 @@ from flightd.core.types import Image
 from flightd.studies.progress_bar import track
 from flightd.vision.shelf.text_reader import TextReader
 from flightd.vision.shelf.text_search import BrokenPictureError, search_name
-from flightd.vision.shelf.text_values import text_values
+from flightd.vision.shelf.text_values import text_values, worth_another
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class PictureTexts:
         self._reader = TextReader()
 
     def __call__(self, bgr: Image) -> PrintedTexts:
-        lines = self._reader.read(bgr)
+        lines = self._reader.read(bgr, lambda looks: len(looks) < 2 or worth_another(looks, self._patterns))
         return PrintedTexts(lines, text_values(lines, self._patterns))
 
 

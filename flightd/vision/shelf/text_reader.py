@@ -2,8 +2,9 @@
 
 Lines are found by its detector and cut out here: its own boxes end at the last stroke, and half a letter is
 read as another one with great confidence.  They are looked for on everything that looks like a label, and
-then in all of the picture: dates are printed on the goods' own wrapping, too.  Each line is read with little
-room around it, and what then says something a second time, with more.
+then in all of the picture: dates are printed on the goods' own wrapping, too.  Dots of a printer that stand
+apart are a line only from afar, so smaller pictures are searched, too.  Each line is read with little room
+around it; what is worth it is looked at again in other ways.
 Needs the extra `ocr`; nothing of it is imported before the first picture.
 """
 
@@ -12,8 +13,8 @@ from __future__ import annotations
 import importlib.util
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import Any, Final, TypeAlias
 
 import cv2
 import numpy as np
@@ -32,8 +33,16 @@ _MOST_LINES: Final = 96
 """Of one picture: what is written on goods is much, and a date stands below it."""
 _LINE_PX: Final = 48
 """Height at which the network reads."""
-_ROOMS: Final = ((0.35, 0.05), (0.60, 0.15))
-"""Room (along, across) around a line as a part of its height, for each look."""
+_SCALES: Final = (1.0, 0.5, 0.25)
+"""Of the pictures that are searched for lines, largest first."""
+_SAME_PLACE: Final = 0.35
+_SAME_END: Final = 0.5
+"""A line that was found before lies within this part of its height (across), and ends within this (along)."""
+_TURNED: Final = 3.0
+"""What is so much higher than wide is no single letter but a line that runs up or down."""
+_ILL_READ: Final = 0.7
+"""Mean probability of the characters below which a line may be upside down."""
+_UPSIDE_DOWN: Final = 0.9
 _JOINED_GAP: Final = 1.2
 """Pieces nearer to each other than this part of their height are one line."""
 _END: Final = 0.15
@@ -45,6 +54,14 @@ _LOST_END_PX: Final = 10
 _LOST_PX: Final = 12
 """So many columns in a row, at an end or within, that have nothing darker (grey levels, noise smoothed) are
 where glare may have taken characters."""
+
+
+Wanted: TypeAlias = Callable[[tuple[TextLook, ...]], bool]
+"""Whether a line that was looked at so is worth another look."""
+
+
+def _two_looks(looks: tuple[TextLook, ...]) -> bool:
+    return len(looks) < 2
 
 
 def needs_extra() -> UnavailableError | None:
@@ -68,9 +85,9 @@ class TextReader:
             params={**one_thread, **sizes, "Global.log_level": "critical", "Global.text_score": 0.0}
         )
 
-    def read(self, bgr: Image, wanted: Callable[[TextLook], bool] | None = None) -> tuple[TextLine, ...]:
-        """The lines in a picture, (H, W, 3) BGR, those on labels first.  Where it is given, only what is
-        `wanted` by its first look gets a second one."""
+    def read(self, bgr: Image, wanted: Wanted = _two_looks) -> tuple[TextLine, ...]:
+        """The lines in a picture, (H, W, 3) BGR, those on labels first, each looked at in one more way as long
+        as that is `wanted` and there is one."""
         height, width = bgr.shape[:2]
         labels = label_regions(bgr)
         found: list[TextLine] = []
@@ -86,26 +103,40 @@ class TextReader:
         return tuple(line for line in found if any(look.text for look in line.looks))
 
     def _strips(self, region: Image) -> list[_Strip]:
-        boxes = self._engine(region, use_det=True, use_cls=False, use_rec=False).boxes
-        strips = [] if boxes is None else [_Strip.of(np.asarray(box, np.float64)) for box in boxes]
-        return _joined(sorted(strips, key=lambda strip: (strip.middle[1], strip.middle[0])))
+        found: list[_Strip] = []
+        for part in _SCALES:
+            scale = part * min(1.0, _LONGEST_SIDE_PX / max(region.shape[:2]))
+            smaller = cv2.resize(region, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+            if min(smaller.shape[:2]) < _LINE_PX // 2:
+                break
+            boxes = self._engine(smaller, use_det=True, use_cls=False, use_rec=False).boxes
+            corners = [] if boxes is None else [np.asarray(box, np.float64) / scale for box in boxes]
+            strips = [_Strip.of(box) for box in corners]
+            lines = _joined(sorted(strips, key=lambda strip: (strip.middle[1], strip.middle[0])))
+            found += [line for line in lines if not any(other.covers(line) for other in found)]
+        return found
 
-    def _line(
-        self,
-        region: Image,
-        strip: _Strip,
-        centre: tuple[float, float],
-        wanted: Callable[[TextLook], bool] | None,
-    ) -> TextLine:
-        first, *others = _ROOMS
-        looks = [self._look(strip.cut_out(region, *first))]
-        if wanted is None or wanted(looks[0]):
-            looks += [self._look(strip.cut_out(region, *room)) for room in others]
+    def _line(self, region: Image, strip: _Strip, centre: tuple[float, float], wanted: Wanted) -> TextLine:
+        looks = [self._look(strip, region, _WAYS[0])]
+        if np.mean(looks[0].sure or (0.0,)) < _ILL_READ and self._is_upside_down(strip, region):
+            strip = strip.turned_round()
+            looks = [self._look(strip, region, _WAYS[0])]
+        for way in _WAYS[1:]:
+            if not wanted(tuple(looks)):
+                break
+            looks.append(self._look(strip, region, way))
         doubts = strip.doubts(region)
         corners = tuple((round(x - centre[0], 1), round(y - centre[1], 1)) for x, y in strip.corners())
         return TextLine(corners, tuple(looks), doubts.left, doubts.right, doubts.gap, round(doubts.glare, 3))
 
-    def _look(self, line: Image) -> TextLook:
+    def _is_upside_down(self, strip: _Strip, region: Image) -> bool:
+        line = strip.cut_out(region, _WAYS[0].along, _WAYS[0].across)
+        out = self._engine(line, use_det=False, use_cls=True, use_rec=False)
+        ((label, sure),) = out.cls_res
+        return bool(label == "180" and sure >= _UPSIDE_DOWN)
+
+    def _look(self, strip: _Strip, region: Image, way: _Way) -> TextLook:
+        line = way.shown(strip.cut_out(region, way.along, way.across))
         out = self._engine(line, use_det=False, use_cls=False, use_rec=True, return_word_box=True)
         if out is None or not out.txts or not out.word_results:
             return TextLook("", ())
@@ -113,6 +144,37 @@ class TextReader:
         if len(text) != len(sure):  # what cannot be told apart is sure to nobody
             return TextLook(text, (0.0,) * len(text))
         return TextLook(text, tuple(map(float, sure)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """How a line is shown for a look: the room along and across it as parts of its height, whether its strokes
+    are made bolder, so that dots touch, and by how much it is smoothed."""
+
+    along: float
+    across: float
+    bolder: bool = False
+    smooth_px: float = 0.0
+
+    def shown(self, line: Image) -> Image:
+        """The line that was cut out, as it is looked at."""
+        if self.bolder:
+            grey = cv2.cvtColor(line, cv2.COLOR_BGR2GRAY)
+            low, paper, high = np.percentile(grey, (5, 50, 95))
+            grow = cv2.erode if paper - low > high - paper else cv2.dilate
+            line = np.asarray(grow(line, _DOT), np.uint8)
+        if self.smooth_px:
+            line = np.asarray(cv2.GaussianBlur(line, (0, 0), self.smooth_px), np.uint8)
+        return line
+
+
+_DOT: Final = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
+_WAYS: Final = (
+    _Way(0.35, 0.05),
+    _Way(0.60, 0.15),
+    _Way(0.35, 0.05, bolder=True),
+    _Way(0.60, 0.15, smooth_px=1.2),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,11 +202,24 @@ class _Strip:
         along = (box[1] - box[0] + box[2] - box[3]) / 2
         down = (box[3] - box[0] + box[2] - box[1]) / 2
         length, height = float(np.linalg.norm(along)), float(np.linalg.norm(down))
+        if height > _TURNED * length:
+            along, length, height = down, height, length
         return cls(box.mean(axis=0), along / max(length, 1e-6), length, max(height, 1.0))
 
     @property
     def down(self) -> Matrix:
         return np.array([-self.along[1], self.along[0]])
+
+    def turned_round(self) -> _Strip:
+        """Upside down."""
+        return replace(self, along=-self.along)
+
+    def covers(self, other: _Strip) -> bool:
+        """Whether the other one is this line or a part of it."""
+        off = other.middle - self.middle
+        beside, across = abs(float(off @ self.along)), abs(float(off @ self.down))
+        end = beside + other.length / 2 - self.length / 2
+        return across < _SAME_PLACE * self.height and end < _SAME_END * self.height
 
     def corners(self, along_room: float = 0.0, across_room: float = 0.0) -> Matrix:
         """(4, 2), with room as parts of the height."""

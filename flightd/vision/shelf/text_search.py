@@ -10,9 +10,9 @@ from flightd.config.label_text import LabelTextConfig
 from flightd.core.label_values import LabelValue
 from flightd.vision.jpeg import decoded_jpeg
 from flightd.vision.shelf.text_reader import TextReader
-from flightd.vision.shelf.text_values import says_something, text_values
+from flightd.vision.shelf.text_values import text_values, worth_another
 
-_METHOD = 2
+_METHOD = 3
 """Another one finds other values: what was searched is searched again then."""
 
 
@@ -39,5 +39,5 @@ class TextSearch:
         bgr = decoded_jpeg(jpeg)
         if bgr is None:
             raise BrokenPictureError("no picture that can be read")
-        lines = self._reader.read(bgr, lambda look: says_something(look, self._patterns))
+        lines = self._reader.read(bgr, lambda looks: worth_another(looks, self._patterns))
         return text_values(lines, self._patterns)

@@ -18,7 +18,14 @@ from typing import Final
 
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.label_text import TextLine, TextLook
-from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource, told_text
+from flightd.core.label_values import (
+    LEAST_TEXT_CONFIDENCE,
+    LabelValue,
+    Told,
+    ValueKind,
+    ValueSource,
+    told_text,
+)
 from flightd.vision.shelf.date_text import date_goes_on, day_of, respaced
 
 _ALIKE: Final = {character: group for group in ("O0", "Il1") for character in group}
@@ -30,11 +37,17 @@ _LOST_TO_GLARE: Final = 0.2
 """And that it loses in a line that is burnt out altogether: what is left of a 9 is a 0."""
 _LONGEST: Final = 120
 """Characters of a line; what is longer is no line of a label."""
+_AGREEING: Final = 3
+"""Looks that must say the same where there are so many."""
+_DATE_DIGITS: Final = 4
+_BLIND_LOOKS: Final = 2
+"""More of them at a line that may be a date, while none says anything."""
 
 
 def text_values(lines: Sequence[TextLine], patterns: Sequence[LabelTextConfig]) -> tuple[LabelValue, ...]:
     """What the lines say, each value once with its confidence: that of the least sure of its characters in
-    the surest of the looks, which must all say the same, whole; else 0, and what one of them says."""
+    the surest of the looks.  All looks of two must say the same, whole, or three of more while none says
+    something else; it is 0 otherwise, and what one of them says."""
     found: dict[tuple[ValueKind, Told], LabelValue] = {}
     for pattern in patterns:
         for line in lines:
@@ -45,21 +58,27 @@ def text_values(lines: Sequence[TextLine], patterns: Sequence[LabelTextConfig]) 
     return tuple(found.values())
 
 
-def says_something(look: TextLook, patterns: Sequence[LabelTextConfig]) -> bool:
-    """Whether a look at a line has a value for one of the patterns, however unsure: without one no other look
-    makes the line sure."""
-    alone = TextLine(((0.0, 0.0),) * 4, (look,))
-    return any(_read(look, alone, pattern)[0] is not None for pattern in patterns)
+def worth_another(looks: Sequence[TextLook], patterns: Sequence[LabelTextConfig]) -> bool:
+    """Whether one more look at a line may make it sure: it has a value for a pattern that is not sure yet, or
+    it may be a date in dots that were not seen together."""
+    line = TextLine(((0.0, 0.0),) * 4, tuple(looks))
+    values = text_values([line], patterns)
+    if values:
+        return len(looks) < 2 or any(value.confidence < LEAST_TEXT_CONFIDENCE for value in values)
+    digits = max(sum(map(str.isdigit, look.text)) for look in looks)
+    return len(looks) <= _BLIND_LOOKS and digits >= _DATE_DIGITS and any(one.is_date for one in patterns)
 
 
 def _value(line: TextLine, pattern: LabelTextConfig) -> LabelValue | None:
     told = [_read(look, line, pattern) for look in line.looks]
-    values = {value for value, _ in told if value is not None}
-    if not values:
+    telling = [(value, sure) for value, sure in told if value is not None]
+    if not telling:
         return None
-    agreed = len(values) == 1 and all(value is not None for value, _ in told)
-    confidence = max(sure for _, sure in told) if agreed and min(sure for _, sure in told) > 0.0 else 0.0
-    first = next(value for value, _ in told if value is not None)
+    first = telling[0][0]
+    agreed = len(telling) >= min(_AGREEING, len(told)) and all(value == first for value, _ in telling)
+    confidence = (
+        max(sure for _, sure in telling) if agreed and min(sure for _, sure in telling) > 0.0 else 0.0
+    )
     return LabelValue(ValueKind(pattern.kind), told_text(first), "", ValueSource.TEXT, round(confidence, 4))
 
 
