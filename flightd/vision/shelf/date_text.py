@@ -1,7 +1,7 @@
 """Dates in lines of printed text: what may touch them, and which separators say the same.
 
 Printers put a date beside other things (`E10/08/2021`, `10/08/2021A12:16`), and reading loses or adds spaces
-and dots (`2021 0808`, `2021. 10 .08`).  None of that changes a digit.
+and dots (`2020 12.03`, `2021. 10 .08`).  None of that changes a digit.
 """
 
 from __future__ import annotations
@@ -13,9 +13,12 @@ from datetime import date, datetime
 from functools import cache
 from typing import Final
 
+_YEARS: Final = range(2000, 2100)
+"""Of goods; a date of another year is no date, or misread."""
 _DIGITS: Final = {"d": 2, "m": 2, "y": 2, "Y": 4, "j": 3}
-_SEPARATORS: Final = {" ": "[ .,·]{0,2}", ".": "[ .,·•]{0,3}", "/": " ?/ ?", "-": " ?[-–—] ?", "": " ?"}
+_SEPARATORS: Final = {" ": "[ .,·]{0,2}", ".": "[ .,·•-]{0,3}", "/": " ?/ ?", "-": " ?[-.] ?", "": " ?"}
 """What may be read for each: spaces have no ink, and a dot has little."""
+_DOTS: Final = str.maketrans(",·•", "...")
 _ONE_STROKE: Final = frozenset("OQDIl|")
 _LIKE_DIGITS: Final = _ONE_STROKE | frozenset("LZSBGTAoizsbgq")
 
@@ -26,21 +29,27 @@ def day_of(text: str, form: str) -> date | None:
         found = datetime.strptime(text, form).date()  # noqa: DTZ007 - a date alone
     except ValueError:
         return None
+    if found.year not in _YEARS:
+        return None
     if "%d" in form or "%j" in form:
         return found
     return found.replace(day=calendar.monthrange(found.year, found.month)[1])
 
 
 def date_goes_on(before: str, text: str, after: str, form: str) -> bool:
-    """Whether a character that touches a date may be a part of it: another digit, or what looks like one.  A
-    year of four digits is whole, one of two may be cut short."""
-    like_digits = _ONE_STROKE if "%Y" in form else _LIKE_DIGITS
-    for neighbour, edge in ((before, text[:1]), (after, text[-1:])):
-        if edge.isdigit() and (neighbour.isdigit() or neighbour in like_digits):
+    """Whether a date may have more characters in what stands `before` and `after` it: another digit, or what
+    looks like one.  A year of four digits is whole, one of two may be cut short, though not by one alone."""
+    like_digits = _ONE_STROKE if has_whole_year(form) else _LIKE_DIGITS
+    for neighbour, edge in ((before[-1:], text[:1]), (after[:1], text[-1:])):
+        if neighbour.isdigit() or (neighbour.isalnum() and not edge.isdigit()):
             return True
-        if not edge.isdigit() and neighbour.isalnum():  # of a month's name
-            return True
-    return False
+    lone = after[1:2] and not after[1:2].isalnum()  # `15FEB22B 09:07`: no year has three digits
+    return before[-1:] in like_digits or (after[:1] in like_digits and not lone)
+
+
+def has_whole_year(form: str) -> bool:
+    """Whether dates in this format have years of four digits."""
+    return "%Y" in form
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +64,23 @@ class RespacedDate:
 
 
 def respaced(text: str, form: str) -> RespacedDate | None:
-    """The first such date in a line.  Of separators between digits one at least must have been read."""
+    """The first such date in a line.  Where all is digits one separator at least is as the format has it: by
+    another one they may mean another order of day and month."""
     for match in _loosely(form).finditer(text):
-        gaps = [said for name, said in match.groupdict().items() if name.startswith("gap")]
-        if any(gaps) or not gaps:
-            parts = _parts(form)
+        parts = _parts(form)
+        gaps = [match[f"gap{at}"] for at in range(1, len(parts))]
+        alike = [
+            literal.strip() in gap.translate(_DOTS) for (literal, _), gap in zip(parts[1:], gaps, strict=True)
+        ]
+        if any(gap and same for gap, same in zip(gaps, alike, strict=True)) or not _is_digits(form):
             shown = "".join(literal + match[f"field{at}"] for at, (literal, _) in enumerate(parts))
-            return RespacedDate(match.start(), match.end(), shown, not all(gaps))
+            return RespacedDate(match.start(), match.end(), shown, not all(gaps) and _is_digits(form))
     return None
+
+
+def _is_digits(form: str) -> bool:
+    """Whether no month has its name in dates of this format."""
+    return all(letter in _DIGITS for _, letter in _parts(form))
 
 
 def _parts(form: str) -> list[tuple[str, str]]:
@@ -72,13 +90,10 @@ def _parts(form: str) -> list[tuple[str, str]]:
 
 @cache
 def _loosely(form: str) -> re.Pattern[str]:
-    """What a date of this format may be read as; one that begins or ends with a literal is its own."""
-    found, left = "", ""
+    """What a date of this format may be read as."""
+    found = ""
     for at, (literal, letter) in enumerate(_parts(form)):
         digits = _DIGITS.get(letter)
-        if at:
-            said = _SEPARATORS.get(literal, re.escape(literal))
-            found += f"(?P<gap{at}>{said})" if digits and left in _DIGITS else said
+        found += f"(?P<gap{at}>{_SEPARATORS.get(literal, re.escape(literal))})" if at else re.escape(literal)
         found += f"(?P<field{at}>" + (rf"\d{{{digits}}}" if digits else "[A-Za-z]+") + ")"
-        left = letter
     return re.compile(rf"(?<!\d)(?<!\d[.,/-]){found}(?!\d)(?![.,/-]\d)", re.ASCII)

@@ -26,7 +26,7 @@ from flightd.core.label_values import (
     ValueSource,
     told_text,
 )
-from flightd.vision.shelf.date_text import date_goes_on, day_of, respaced
+from flightd.vision.shelf.date_text import date_goes_on, day_of, has_whole_year, respaced
 
 _ALIKE: Final = {character: group for group in ("O0", "Il1") for character in group}
 _MOST_READINGS: Final = 4096
@@ -46,8 +46,8 @@ _BLIND_LOOKS: Final = 2
 
 def text_values(lines: Sequence[TextLine], patterns: Sequence[LabelTextConfig]) -> tuple[LabelValue, ...]:
     """What the lines say, each value once with its confidence: that of the least sure of its characters in
-    the surest of the looks.  All looks of two must say the same, whole, or three of more while none says
-    something else; it is 0 otherwise, and what one of them says."""
+    the surest of the looks; in the surest two where three agree.  All looks of two must say the same, whole,
+    or three of more while none says something else; it is 0 otherwise, and what one of them says."""
     found: dict[tuple[ValueKind, Told], LabelValue] = {}
     for pattern in patterns:
         for line in lines:
@@ -71,14 +71,16 @@ def worth_another(looks: Sequence[TextLook], patterns: Sequence[LabelTextConfig]
 
 def _value(line: TextLine, pattern: LabelTextConfig) -> LabelValue | None:
     told = [_read(look, line, pattern) for look in line.looks]
-    telling = [(value, sure) for value, sure in told if value is not None]
+    telling = [one for one in told if one is not None]
     if not telling:
         return None
-    first = telling[0][0]
-    agreed = len(telling) >= min(_AGREEING, len(told)) and all(value == first for value, _ in telling)
-    confidence = (
-        max(sure for _, sure in telling) if agreed and min(sure for _, sure in telling) > 0.0 else 0.0
-    )
+    first = telling[0].value
+    agreed = len(telling) >= min(_AGREEING, len(told)) and all(one.value == first for one in telling)
+    confidence = 0.0
+    if agreed and all(one.part > 0.0 for one in telling):
+        *_, second, surest = sorted((0.0, *(one.sure for one in telling)))
+        both = 1.0 - (1.0 - surest) * (1.0 - second) if len(telling) >= _AGREEING else surest
+        confidence = min(one.part for one in telling) * both
     return LabelValue(ValueKind(pattern.kind), told_text(first), "", ValueSource.TEXT, round(confidence, 4))
 
 
@@ -95,30 +97,35 @@ class _Found:
     whole: bool = False
 
 
-def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> tuple[Told | None, float]:
-    """The value of one look with the probability of its least sure character; 0 where it can mean something
-    else, or may go on beyond what was read."""
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """What one look tells, the probability of its least sure character, and the part of its confidence that
+    the line leaves to it: none where it can mean something else, or may go on beyond what was read."""
+
+    value: Told
+    sure: float
+    part: float
+
+
+def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> _Look | None:
     meant = _meant(look.text, pattern)
     if not meant:
-        return None, 0.0
+        return None
     value, found = next(iter(meant.items()))
-    more_right = (line.gap or (line.open_right and found.end == len(look.text))) and _fits_longer(
-        found.shown, found.shown_end, pattern
-    )
-    more_left = line.open_left and found.start == 0 and _fits_longer(found.shown, 0, pattern)
-    if len(meant) > 1 or more_right or more_left:
-        return value, 0.0
+    short = pattern.is_date and not found.whole
+    ends_right = line.gap or (line.open_right and found.end == len(look.text))
+    more_right = ends_right and (short or _fits_longer(found.shown, found.shown_end, pattern))
+    more_left = line.open_left and found.start == 0 and (short or _fits_longer(found.shown, 0, pattern))
     repaired = look.text[found.start : found.end] != found.reading[found.start : found.end]
     part = (_REPAIRED if repaired else 1.0) * (1.0 - _LOST_TO_GLARE * line.glare)
     # what is left of another character of the value, perhaps
-    touching = "" if found.whole else look.text[found.end : found.end + 1].strip()
-    end = found.end + len(touching)
-    told = [
+    end = found.end + (0 if found.whole else len(look.text[found.end : found.end + 1].strip()))
+    sure = min(
         sure
         for character, sure in zip(look.text[found.start : end], look.sure[found.start : end], strict=True)
         if character.isalnum() or not found.whole
-    ]
-    return value, min(told) * part
+    )
+    return _Look(value, sure, 0.0 if len(meant) > 1 or more_right or more_left else part)
 
 
 def _meant(text: str, pattern: LabelTextConfig) -> dict[Told, _Found]:
@@ -162,8 +169,8 @@ def _as_it_stands(reading: str, pattern: LabelTextConfig) -> Iterator[tuple[Told
         for form in pattern.dates:
             day = day_of(match[1].strip(), form)
             if day is not None and not date_goes_on(before, match[1], after, form):
-                yield day, replace(found, whole="%Y" in form)
-    elif not before.isalnum() and not after.isalnum():
+                yield day, replace(found, whole=has_whole_year(form))
+    elif not before[-1:].isalnum() and not after[:1].isalnum():
         yield from ((value, found) for value in _meanings(match[1], pattern))
 
 
@@ -179,12 +186,12 @@ def _respaced(reading: str, pattern: LabelTextConfig) -> Iterator[tuple[date, _F
         match = re.search(pattern.pattern, line)
         if match is None or match.span(1) != (start, shown_end):
             continue
-        if other.lost and line[: match.start()].strip():  # `02 2021 0808` is a telephone number
+        if other.lost and match.start() == start:  # without a caption `2021 0808` may be a telephone number
             continue
         day = day_of(other.shown, form)
-        before = reading[start - 1 : start] if start and start == match.start() else ""
-        if day is not None and not date_goes_on(before, other.shown, reading[end : end + 1], form):
-            yield day, _Found(start, end, reading, line, shown_end, "%Y" in form)
+        before = reading[:start] if start == match.start() else ""
+        if day is not None and not date_goes_on(before, other.shown, reading[end:], form):
+            yield day, _Found(start, end, reading, line, shown_end, has_whole_year(form))
 
 
 def _fits_longer(text: str, at: int, pattern: LabelTextConfig) -> bool:
