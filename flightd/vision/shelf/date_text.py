@@ -64,23 +64,18 @@ class RespacedDate:
 
 
 def respaced(text: str, form: str) -> RespacedDate | None:
-    """The first such date in a line.  Where all is digits one separator at least is as the format has it: by
-    another one they may mean another order of day and month."""
+    """The first such date in a line.  Between digits one separator at least is as the format has it, for by
+    another one they may mean another order; and beside a month's name (`NOV2021`) none is lost."""
+    parts = _parts(form)
+    between = [at for at in range(1, len(parts)) if {parts[at - 1][1], parts[at][1]} <= _DIGITS.keys()]
     for match in _loosely(form).finditer(text):
-        parts = _parts(form)
-        gaps = [match[f"gap{at}"] for at in range(1, len(parts))]
-        alike = [
-            literal.strip() in gap.translate(_DOTS) for (literal, _), gap in zip(parts[1:], gaps, strict=True)
-        ]
-        if any(gap and same for gap, same in zip(gaps, alike, strict=True)) or not _is_digits(form):
+        gaps = [match[f"gap{at}"].translate(_DOTS) for at in between]
+        lost = any(parts[at][0] and not gap for at, gap in zip(between, gaps, strict=True))
+        as_written = any(gap and parts[at][0].strip() in gap for at, gap in zip(between, gaps, strict=True))
+        if as_written if len(between) == len(parts) - 1 else not lost:
             shown = "".join(literal + match[f"field{at}"] for at, (literal, _) in enumerate(parts))
-            return RespacedDate(match.start(), match.end(), shown, not all(gaps) and _is_digits(form))
+            return RespacedDate(match.start(), match.end(), shown, lost)
     return None
-
-
-def _is_digits(form: str) -> bool:
-    """Whether no month has its name in dates of this format."""
-    return all(letter in _DIGITS for _, letter in _parts(form))
 
 
 def _parts(form: str) -> list[tuple[str, str]]:
