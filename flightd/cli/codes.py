@@ -24,7 +24,7 @@ def register(app: typer.Typer) -> None:
 def codes(
     paths: Pictures,
     labels: Annotated[
-        Path | None, typer.Option(metavar="F", help="Compare with the texts that this JSON file expects.")
+        Path | None, typer.Option(metavar="F", help="Compare with what this JSON file expects.")
     ] = None,
     text: Annotated[bool, typer.Option("--text", help="Read printed lines, too (extra `ocr`).")] = False,
     config: Annotated[
@@ -38,7 +38,8 @@ def codes(
     own checksum vouches for it or two ways of looking at the picture agree; the rest is counted as doubtful.
 
     \b
-    F: {"codes": [{"file": "a.jpg", "text": "9780804816632"}]}
+    F: {"codes": [{"file": "a.jpg", "text": "9780804816632"}],
+        "texts": [{"file": "a.jpg", "kind": "expiry", "value": "2026-12-31", "group": "dot matrix"}]}
 
     \b
     Examples:
@@ -52,7 +53,9 @@ def codes(
     if config is not None and not text:
         raise InputError("says what printed lines mean", key="--config", remedy="add --text")
     texts = _texts(config) if text else None
-    expected = command.read_expected(labels) if labels else None
+    expected = command.read_labels(labels) if labels else None
+    if labels and expected and expected.texts and config is None:
+        raise InputError('has "texts"', file=labels, remedy="add --text --config F")
     pictures = command.read(paths, texts)
     if as_json:
         sys.stdout.write(command.as_json(list(pictures), expected) + "\n")
@@ -62,8 +65,10 @@ def codes(
     for picture in pictures:
         command.print_picture(picture, console)
         shown.append(picture)
-    if expected is not None:
-        command.print_verdict(command.compare(shown, expected), console)
+    if expected is not None and expected.codes is not None:
+        command.print_verdict(command.compare(shown, expected.codes), console)
+    if expected is not None and expected.texts:
+        command.print_texts_verdict(command.compared_texts(shown, expected.texts), console)
 
 
 def _texts(config: Path | None) -> PictureTexts:

@@ -18,6 +18,7 @@ from flightd.core.terminal_text import visible
 from flightd.core.types import CodeRead
 from flightd.studies.frame_files import all_pictures
 from flightd.studies.label_texts import PictureTexts, PrintedTexts, is_sure, surest, texts_json
+from flightd.studies.text_labels import TextComparison, TextLabels, compare_texts, text_labels
 from flightd.vision.shelf.code_reader import read_codes
 
 Expected: TypeAlias = Mapping[str, frozenset[str]]
@@ -66,15 +67,27 @@ def read(paths: Sequence[Path], texts: PictureTexts | None = None) -> Iterator[R
         yield ReadPicture(picture.name, picture.bgr.shape[1], picture.bgr.shape[0], ms, reads, printed)
 
 
-def read_expected(path: Path) -> Expected:
-    """The texts that a labels file expects.  Raises InputError naming the file and the entry."""
+@dataclass(frozen=True, slots=True)
+class LabelsFile:
+    """What a labels file expects of pictures; no codes where it has no list of them."""
+
+    codes: Expected | None
+    texts: TextLabels
+
+
+def read_labels(path: Path) -> LabelsFile:
+    """What a labels file expects: codes, printed texts, or both.  Raises InputError naming file and entry."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as err:
         raise InputError(f"cannot read the labels: {err.strerror or err}", file=path) from None
     except (ValueError, RecursionError) as err:
         raise InputError(f"not JSON: {err}", file=path) from None
-    entries = document.get("codes") if isinstance(document, dict) else None
+    if not isinstance(document, dict):
+        document = {}
+    if "codes" not in document and "texts" in document:
+        return LabelsFile(None, text_labels(document, path))
+    entries = document.get("codes")
     if not isinstance(entries, list):
         remedy = 'write {"codes": [{"file": …, "text": …}]}'
         raise InputError('has no list "codes"', file=path, remedy=remedy)
@@ -84,7 +97,8 @@ def read_expected(path: Path) -> Expected:
         if not isinstance(file, str) or not isinstance(text, str):
             raise InputError('needs "file" and "text", both strings', file=path, key=f"codes[{i}]")
         texts[file].add(_plain(text))
-    return {file: frozenset(those) for file, those in texts.items()}
+    codes = {file: frozenset(those) for file, those in texts.items()}
+    return LabelsFile(codes, text_labels(document, path))
 
 
 def compare(pictures: Sequence[ReadPicture], expected: Expected) -> ReadVerdict:
@@ -110,12 +124,20 @@ def _plain(text: str) -> str:
     return bare[1:] if len(bare) == 13 and bare.startswith("0") and bare.isdecimal() else bare
 
 
-def as_json(pictures: Sequence[ReadPicture], expected: Expected | None) -> str:
+def compared_texts(pictures: Sequence[ReadPicture], labels: TextLabels) -> TextComparison:
+    """Hold what printed text was told to say against the labels."""
+    told = {Path(one.name).name: one.texts.values for one in pictures if one.texts is not None}
+    return compare_texts(told, labels)
+
+
+def as_json(pictures: Sequence[ReadPicture], expected: LabelsFile | None) -> str:
     """The one JSON document of `flightd codes --json`; corners are pixels from the top left."""
     document: dict[str, object] = {"images": [_image(picture) for picture in pictures]}
-    if expected is not None:
-        verdict = compare(pictures, expected)
+    if expected is not None and expected.codes is not None:
+        verdict = compare(pictures, expected.codes)
         document["verdict"] = asdict(verdict) | {"read_part": round(verdict.read_part, 5)}
+    if expected is not None and expected.texts:
+        document["text_verdict"] = asdict(compared_texts(pictures, expected.texts))
     return json.dumps(document, indent=1, ensure_ascii=False)
 
 
@@ -188,3 +210,16 @@ def print_verdict(verdict: ReadVerdict, console: Console) -> None:
     for kind, those in (("missed", verdict.missed), ("wrong", verdict.wrong)):
         for entry in those:
             console.print(f"  {kind} {visible(entry)}", highlight=False, markup=False, soft_wrap=True)
+
+
+def print_texts_verdict(compared: TextComparison, console: Console) -> None:
+    """The comparison of printed values for people."""
+    for one in compared.groups:
+        name = f"{visible(one.group)}: " if one.group else ""
+        counts = (
+            f"{one.right} of {one.expected} values told right, {one.unknown} unknown, {one.missed} not read"
+        )
+        console.print(name + counts, style="bold", highlight=False, markup=False, soft_wrap=True)
+    console.print(f"{len(compared.wrong)} values told wrong", style="bold")
+    for entry in compared.wrong:
+        console.print(f"  wrong {visible(entry)}", highlight=False, markup=False, soft_wrap=True)

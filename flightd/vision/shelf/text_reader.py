@@ -37,7 +37,7 @@ _SCALES: Final = (1.0, 0.5, 0.25)
 """Of the pictures that are searched for lines, largest first."""
 _SAME_PLACE: Final = 0.35
 _SAME_END: Final = 0.5
-"""A line that was found before lies within this part of its height (across), and ends within this (along)."""
+"""A line that was found before lies within this part of its height across, and ends within this along."""
 _TURNED: Final = 3.0
 """What is so much higher than wide is no single letter but a line that runs up or down."""
 _ILL_READ: Final = 0.7
@@ -86,8 +86,8 @@ class TextReader:
         )
 
     def read(self, bgr: Image, wanted: Wanted = _two_looks) -> tuple[TextLine, ...]:
-        """The lines in a picture, (H, W, 3) BGR, those on labels first, each looked at in one more way as long
-        as that is `wanted` and there is one."""
+        """The lines in a picture, (H, W, 3) BGR, those on labels first, each looked at in one more way as
+        long as that is `wanted` and there is one."""
         height, width = bgr.shape[:2]
         labels = label_regions(bgr)
         found: list[TextLine] = []
@@ -111,8 +111,8 @@ class TextReader:
                 break
             boxes = self._engine(smaller, use_det=True, use_cls=False, use_rec=False).boxes
             corners = [] if boxes is None else [np.asarray(box, np.float64) / scale for box in boxes]
-            strips = [_Strip.of(box) for box in corners]
-            lines = _joined(sorted(strips, key=lambda strip: (strip.middle[1], strip.middle[0])))
+            strips = sorted(map(_Strip.of, corners), key=lambda strip: (strip.middle[1], strip.middle[0]))
+            lines = _joined(strips)
             found += [line for line in lines if not any(other.covers(line) for other in found)]
         return found
 
@@ -148,8 +148,8 @@ class TextReader:
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """How a line is shown for a look: the room along and across it as parts of its height, whether its strokes
-    are made bolder, so that dots touch, and by how much it is smoothed."""
+    """How a line is shown for a look: the room along and across it as parts of its height, whether its
+    strokes are made bolder, so that dots touch, and by how much it is smoothed."""
 
     along: float
     across: float

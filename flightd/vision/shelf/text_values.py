@@ -86,8 +86,8 @@ def _value(line: TextLine, pattern: LabelTextConfig) -> LabelValue | None:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """Where in a line a value was found: its part of the `reading` that told it, and its end in the line as the
-    pattern takes it, `shown`.  A `whole` one can have lost nothing at its ends."""
+    """Where in a line a value was found: its part of the `reading` that told it, and its end in the line as
+    the pattern takes it, `shown`.  A `whole` one can have lost nothing at its ends."""
 
     start: int
     end: int
@@ -99,8 +99,8 @@ class _Found:
 
 @dataclass(frozen=True, slots=True)
 class _Look:
-    """What one look tells, the probability of its least sure character, and the part of its confidence that
-    the line leaves to it: none where it can mean something else, or may go on beyond what was read."""
+    """What one look tells, the probability of its least sure character, and the part of that which the line
+    leaves to it: none where something else can be meant, or the value may go on beyond what was read."""
 
     value: Told
     sure: float

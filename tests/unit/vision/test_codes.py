@@ -236,7 +236,7 @@ def test_the_region_of_a_code_is_found_and_a_bare_shelf_has_none() -> None:
 def test_the_photographs_are_read() -> None:
     from flightd.studies import codes as command
 
-    expected = command.read_expected(PHOTOGRAPHS / "codes.json")
+    expected = command.read_labels(PHOTOGRAPHS / "codes.json").codes or {}
     verdict = command.compare(list(command.read([PHOTOGRAPHS])), expected)
     assert verdict.wrong == ()
     assert verdict.read_part >= 0.98, verdict.missed
