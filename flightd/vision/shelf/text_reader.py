@@ -159,9 +159,7 @@ class _Way:
     def shown(self, line: Image) -> Image:
         """The line that was cut out, as it is looked at."""
         if self.bolder:
-            grey = cv2.cvtColor(line, cv2.COLOR_BGR2GRAY)
-            low, paper, high = np.percentile(grey, (5, 50, 95))
-            grow = cv2.erode if paper - low > high - paper else cv2.dilate
+            grow = cv2.dilate if _is_light(line) else cv2.erode
             line = np.asarray(grow(line, _DOT), np.uint8)
         if self.smooth_px:
             line = np.asarray(cv2.GaussianBlur(line, (0, 0), self.smooth_px), np.uint8)
@@ -241,9 +239,11 @@ class _Strip:
     def doubts(self, region: Image) -> _Doubts:
         """What may be wrong with the line, whatever is read in it."""
         room = _END + 0.05
-        grey = cv2.cvtColor(self.cut_out(region, room, 0.0), cv2.COLOR_BGR2GRAY)
+        line = self.cut_out(region, room, 0.0)
+        grey = cv2.cvtColor(line, cv2.COLOR_BGR2GRAY)
         wide = max(2, round(_END * _LINE_PX))
-        paper, ink = np.percentile(grey, (80, 5))
+        toned = 255 - grey if _is_light(line) else grey
+        paper, ink = np.percentile(toned, (80, 5))
         outside = self.corners(room)
         size = np.array((region.shape[1], region.shape[0]))
         inside: NDArray[np.bool_] = np.all((outside >= 0) & (outside < size), axis=1)
@@ -251,7 +251,7 @@ class _Strip:
         lightest = smooth.min(axis=0)
         ends = []
         for end, corners in ((slice(wide), inside[[0, 3]]), (slice(-wide, None), inside[[1, 2]])):
-            dark = float(np.percentile(grey[:, end], 5)) < paper - 0.5 * (paper - ink)
+            dark = float(np.percentile(toned[:, end], 5)) < paper - 0.5 * (paper - ink)
             columns = lightest[:_LOST_END_PX] if end.start is None else lightest[-_LOST_END_PX:]
             ends.append(bool(dark or not corners.all() or columns.min() >= _WHITE))
         within = lightest[_LOST_END_PX:-_LOST_END_PX] >= _WHITE
@@ -275,6 +275,12 @@ class _Strip:
         way = other.corners()[[0, 3]].mean(axis=0) - self.corners()[[1, 2]].mean(axis=0)
         gap, off = float(way @ self.along), float(way @ self.down)
         return -height < gap < _JOINED_GAP * height and abs(off) < 0.4 * height
+
+
+def _is_light(line: Image) -> bool:
+    """Whether the letters are lighter than what they stand on."""
+    low, middle, high = np.percentile(cv2.cvtColor(line, cv2.COLOR_BGR2GRAY), (5, 50, 95))
+    return bool(middle - low < high - middle)
 
 
 def _is_inside(strip: _Strip, box: Box) -> bool:
