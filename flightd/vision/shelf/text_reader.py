@@ -40,7 +40,7 @@ _SAME_END: Final = 0.5
 """A line that was found before lies within this part of its height across, and ends within this along."""
 _TURNED: Final = 3.0
 """What is so much higher than wide is no single letter but a line that runs up or down."""
-_ILL_READ: Final = 0.7
+_ILL_READ: Final = 0.9
 """Mean probability of the characters below which a line may be upside down."""
 _UPSIDE_DOWN: Final = 0.9
 _JOINED_GAP: Final = 1.2

@@ -6,6 +6,7 @@ import json
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -73,34 +74,82 @@ def boxes(*corners: tuple[int, int, int, int]) -> list[list[tuple[int, int]]]:
     return [[(x0, y0), (x1, y0), (x1, y1), (x0, y1)] for x0, y0, x1, y1 in corners]
 
 
+class Engine:
+    """Finds boxes where a test says, by the picture's height, and reads the width of what it is given."""
+
+    found: ClassVar[dict[int, list[list[tuple[int, int]]]]] = {}
+    sure: ClassVar[float] = 1.0
+    turned: ClassVar[str] = "0"
+    read: ClassVar[list[Image]] = []
+
+    def __init__(self, **_: object) -> None:
+        pass
+
+    def __call__(self, bgr: Image, use_det: bool, use_cls: bool, **_: object) -> SimpleNamespace:
+        if use_det:
+            return SimpleNamespace(boxes=self.found.get(bgr.shape[0]))
+        if use_cls:
+            return SimpleNamespace(cls_res=[(self.turned, 0.99)])
+        self.read.append(bgr)
+        words = [SimpleNamespace(confs=[self.sure] * len(str(bgr.shape[1])))]
+        return SimpleNamespace(txts=[str(bgr.shape[1])], word_results=words)
+
+
+@pytest.fixture
+def engine(monkeypatch: pytest.MonkeyPatch) -> type[Engine]:
+    one = type("OneEngine", (Engine,), {"read": []})
+    monkeypatch.setitem(sys.modules, "rapidocr", SimpleNamespace(RapidOCR=one))
+    return one
+
+
+BLANK = np.full((120, 200, 3), 235, np.uint8)
+"""No label stands out: the whole is looked at."""
+
+
 def test_pieces_of_a_line_are_one_and_a_broken_picture_is_no_fault_of_the_reader(
-    monkeypatch: pytest.MonkeyPatch,
+    engine: type[Engine],
 ) -> None:
-    """With an engine that finds boxes and tells the width of what it is given to read."""
-
-    class Engine:
-        def __init__(self, **_: object) -> None:
-            pass
-
-        def __call__(self, bgr: Image, use_det: bool, **_: object) -> SimpleNamespace:
-            if use_det:
-                # two pieces of one line, right one first, and a line below
-                return SimpleNamespace(boxes=boxes((90, 20, 150, 40), (20, 21, 80, 41), (20, 60, 100, 80)))
-            words = [SimpleNamespace(confs=[1.0] * len(str(bgr.shape[1])))]
-            return SimpleNamespace(txts=[str(bgr.shape[1])], word_results=words)
-
-    monkeypatch.setitem(sys.modules, "rapidocr", SimpleNamespace(RapidOCR=Engine))
+    # two pieces of one line, right one first, and a line below
+    engine.found = {120: boxes((90, 20, 150, 40), (20, 21, 80, 41), (20, 60, 100, 80))}
     search = TextSearch((LabelTextConfig(kind="quantity", pattern=r"(\d+)"),))
-    picture = np.full((120, 200, 3), 235, np.uint8)  # no label stands out: the whole is looked at
-    lines = TextReader().read(picture)
+    lines = TextReader().read(BLANK)
     assert len(lines) == 2
     # 130 px long and 20 high, with 0.35 and 0.6 of that at both ends, 0.05 and 0.15 above and below
     widths = [round(144 * 48 / 22), round(154 * 48 / 26)]
     assert [look.text for look in lines[0].looks] == list(map(str, widths))
-    assert search(evidence_jpeg(picture))
-    for broken in (b"no picture", evidence_jpeg(picture)[:200]):
+    assert search(evidence_jpeg(BLANK))
+    for broken in (b"no picture", evidence_jpeg(BLANK)[:200]):
         with pytest.raises(BrokenPictureError):
             search(broken)
+
+
+def test_what_is_a_line_only_from_afar_is_read_and_none_twice(engine: type[Engine]) -> None:
+    engine.found = {
+        120: boxes((20, 20, 80, 40)),
+        60: boxes((10, 10, 40, 20), (10, 40, 80, 50)),  # the first again, and one
+    }
+    first, second = TextReader().read(BLANK)
+    assert first.corners_px[0] == (20 - 99.5, 20 - 59.5)
+    assert second.corners_px[0] == (20 - 99.5, 80 - 59.5)
+
+
+def test_a_line_is_looked_at_in_other_ways_as_long_as_that_is_wanted(engine: type[Engine]) -> None:
+    engine.found = {120: boxes((20, 20, 80, 40))}
+    for wanted, looks in ((0, 1), (2, 2), (3, 3), (9, 4)):
+        (line,) = TextReader().read(BLANK, lambda those, most=wanted: len(those) < most)
+        assert len(line.looks) == looks
+
+
+def test_an_ill_read_line_is_turned_round_where_it_is_upside_down(engine: type[Engine]) -> None:
+    picture = BLANK.copy()
+    picture[20:40, 20:40] = 0  # the left third of the line
+    engine.found = {120: boxes((20, 20, 80, 40))}
+    for sure, turned, round_turned in ((0.5, "180", True), (0.5, "0", False), (0.95, "180", False)):
+        engine.sure, engine.turned = sure, turned
+        (line,) = TextReader().read(picture, lambda looks: False)
+        left, right = engine.read[-1][:, :40].mean(), engine.read[-1][:, -40:].mean()
+        assert (left > right) == round_turned
+        assert (line.corners_px[0] == (80 - 99.5, 40 - 59.5)) == round_turned
 
 
 def test_lines_are_read_and_a_cut_one_is_not_believed() -> None:
@@ -137,9 +186,41 @@ def test_what_is_printed_on_the_goods_beside_a_label_and_below_much_text_is_read
     }
     assert {kind: text for kind, (text, _) in told.items()} == {"lot": "B1203", "expiry": "2027-03-14"}
     assert min(sure for _, sure in told.values()) > 0.9
-    lines = TextReader().read(picture, lambda look: "USE" in look.text)
+    lines = TextReader().read(picture, lambda looks: "USE" in looks[0].text and len(looks) < 2)
     assert {len(line.looks) for line in lines if "SUGAR" in line.looks[0].text} == {1}
     assert {len(line.looks) for line in lines if "USE" in line.looks[0].text} == {2}
+
+
+@pytest.mark.parametrize("turn", [cv2.ROTATE_180, cv2.ROTATE_90_CLOCKWISE, cv2.ROTATE_90_COUNTERCLOCKWISE])
+def test_turned_labels_are_read(turn: int) -> None:
+    pytest.importorskip("rapidocr")
+    patterns = (
+        LabelTextConfig(kind="lot", pattern=r"LOT\s*([A-Z]\d{4})"),
+        LabelTextConfig(kind="expiry", pattern=r"EXP\s*(\S+)", dates=("%d.%m.%Y",)),
+    )
+    told = TextSearch(patterns)(evidence_jpeg(np.ascontiguousarray(cv2.rotate(shelf(*LINES), turn))))
+    assert {(str(one.kind), told_text(one.value)) for one in told if one.confidence > 0.9} == {
+        ("lot", "B1203"), ("expiry", "2026-12-31"),
+    }  # fmt: skip
+
+
+def dotted(text: str, *, dark: bool) -> Image:
+    """A line as a dot printer writes it, letters 110 px high, dots that are a line only from afar."""
+    small = np.zeros((14, 9 * len(text)), np.uint8)
+    cv2.putText(small, text, (1, 11), cv2.FONT_HERSHEY_PLAIN, 0.8, 255, 1)
+    paper, ink = (205, 60) if dark else (50, 200)
+    picture = np.full((360, 1200, 3), paper, np.uint8)
+    for y, x in np.argwhere(small > 110):
+        cv2.circle(picture, (60 + 12 * int(x), 80 + 12 * int(y)), 2, (ink,) * 3, cv2.FILLED, cv2.LINE_AA)
+    return picture
+
+
+@pytest.mark.parametrize("dark", [True, False])
+def test_dots_that_stand_far_apart_are_read(dark: bool) -> None:
+    pytest.importorskip("rapidocr")
+    asked = LabelTextConfig(kind="expiry", pattern=r"(\d{4}\.\d{2}\.\d{2})", dates=("%Y.%m.%d",))
+    told = TextSearch((asked,))(evidence_jpeg(dotted("2027.03.14", dark=dark)))
+    assert [(told_text(one.value), one.confidence > 0.9) for one in told] == [("2027-03-14", True)]
 
 
 def test_the_commands_read_photographs_and_kept_pictures(tmp_path: Path) -> None:

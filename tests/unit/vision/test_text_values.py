@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.label_text import TextLine, TextLook
 from flightd.core.label_values import LabelValue, Told, ValueKind, ValueSource
-from flightd.vision.shelf.text_values import text_values
+from flightd.vision.shelf.text_values import text_values, worth_another
 
 LOT = LabelTextConfig(kind="lot", pattern=r"LOT[:\s]*([A-Z]\d{3,5})")
 ANY_LOT = LabelTextConfig(kind="lot", pattern=r"LOT\s*([A-Z0-9]+)")
@@ -64,6 +64,128 @@ def test_a_line_that_can_mean_two_things_is_sure_to_nobody(pattern: LabelTextCon
 @pytest.mark.parametrize("text", ["LOT B12", "LOTB123456", "EXP 31.02.2026", "EXP 31.13.2026", "QTY 48X", ""])
 def test_what_does_not_fit_is_nothing(text: str) -> None:
     assert text_values([line(text, text)], (LOT, EXPIRY, QUANTITY)) == ()
+
+
+DAY = LabelTextConfig(kind="expiry", pattern=r"(\d{2}/\d{2}/\d{4})", dates=("%d/%m/%Y",))
+SHORT = LabelTextConfig(kind="expiry", pattern=r"(\d{2}[A-Z]{3}\d{2})", dates=("%d%b%y",))
+DOTS = LabelTextConfig(kind="expiry", pattern=r"(\d{4}\.\d{2}\.\d{2})", dates=("%Y.%m.%d",))
+SPACES = LabelTextConfig(kind="expiry", pattern=r"EXP (\d{4} \d{2} \d{2})", dates=("%Y %m %d",))
+NAMED = LabelTextConfig(kind="expiry", pattern=r"([A-Z]{3} \d{2} \d{2})", dates=("%b %d %y",))
+DASHES = LabelTextConfig(kind="expiry", pattern=r"(\d{2}-\d{2}-\d{4})", dates=("%d-%m-%Y",))
+
+
+@pytest.mark.parametrize(
+    ("pattern", "text", "value"),
+    [
+        (DAY, "E10/08/2021", date(2021, 8, 10)),
+        (DAY, "EXP20/12/2025", date(2025, 12, 20)),
+        (DAY, "10/08/2021A12:16", date(2021, 8, 10)),
+        (DOTS, "2022.01.18B", date(2022, 1, 18)),
+        (DOTS, "2022.10.17까지", date(2022, 10, 17)),
+        (SHORT, "BY15FEB22N 09:07", date(2022, 2, 15)),
+        (SHORT, "15FEB22B 09:07", date(2022, 2, 15)),  # no year has three digits
+        (DAY, "10 /08/ 2021", date(2021, 8, 10)),
+        (DOTS, "2020 12.03", date(2020, 12, 3)),
+        (DOTS, "2021. 10 .08", date(2021, 10, 8)),
+        (DOTS, "2021,10·08", date(2021, 10, 8)),
+        (DOTS, "2020-11.06", date(2020, 11, 6)),
+        (DASHES, "03-04.2021", date(2021, 4, 3)),
+        (SPACES, "EXP 2021 0808", date(2021, 8, 8)),
+        (SHORT, "15 FEB 22 09:07", date(2022, 2, 15)),
+        (NAMED, "JUN08 21 06:45", date(2021, 6, 8)),
+    ],
+)
+def test_letters_that_touch_a_date_and_separators_read_otherwise_change_no_digit(
+    pattern: LabelTextConfig, text: str, value: date
+) -> None:
+    assert told(pattern, line(text, text)) == [(value, 0.99)]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "text"),
+    [
+        (DAY, "120/12/2025"),
+        (DAY, "I20/12/2025"),
+        (DAY, "20/12/20251"),
+        (DOTS, "2021.11.118"),
+        (SHORT, "15FEB22B7"),  # 15FEB2287, perhaps
+        (SHORT, "15FEB22B"),  # cut short, perhaps
+        (SHORT, "Z15FEB22"),
+        (NAMED, "XJUN 08 21"),
+        (SPACES, "EXP 20210808"),
+        (DOTS, "2021 10 08"),  # in another order, perhaps
+        (DASHES, "03.04.2021"),
+        (DOTS, "2021.1008"),  # a number of something
+        (DOTS, "7.2021. 10.08"),
+        (NAMED, "NOV2021"),  # the month of a year
+        (NAMED, "12 JAN 2023"),
+        (DAY, "18/02/0745"),
+        (DAY, "18/02/2582"),
+        (LabelTextConfig(kind="expiry", pattern=r"(\d\d\.\d\d\.\d\d)", dates=("%d.%m.%y",)), "20:12:25"),
+    ],
+)
+def test_what_only_resembles_a_date_is_none(pattern: LabelTextConfig, text: str) -> None:
+    assert told(pattern, line(text, text)) == []
+
+
+@given(st.text("0179ABEILOSXZ", max_size=4), st.text("0179ABEILOSXZ", max_size=4))
+def test_whatever_touches_a_date_it_is_told_as_it_stands_or_not_at_all(before: str, after: str) -> None:
+    for pattern, text, value in (
+        (DAY, "10/11/2021", date(2021, 11, 10)),
+        (DOTS, "2021. 11.10", date(2021, 11, 10)),
+        (SHORT, "10NOV21", date(2021, 11, 10)),
+    ):
+        found = told(pattern, line(before + text + after, before + text + after))
+        digit = before[-1:].isdigit() or after[:1].isdigit()
+        assert found == [] if digit else {day for day, sure in found if sure} <= {value}
+
+
+@given(st.text("0123456789 .,/-", max_size=16))
+def test_a_date_in_digits_has_its_digits_side_by_side_in_the_text(text: str) -> None:
+    for pattern, form in ((DAY, "%d%m%Y"), (DOTS, "%Y%m%d"), (SPACES, "%Y%m%d")):
+        for day, _ in told(pattern, line(f"EXP {text}", f"EXP {text}")):
+            assert isinstance(day, date)
+            assert day.strftime(form) in "".join(filter(str.isdigit, text))
+
+
+def test_a_date_whose_year_has_two_digits_may_be_cut_short_where_the_line_is_open() -> None:
+    short = LabelTextConfig(kind="expiry", pattern=r"(\d{2}/\d{2}/\d{2})", dates=("%d/%m/%y",))
+    assert told(short, line("12/03/20", "12/03/20")) == [(date(2020, 3, 12), 0.99)]
+    assert told(short, line("12/03/20", "12/03/20", right=True)) == [(date(2020, 3, 12), 0.0)]
+    assert told(DAY, line("12/03/2020", "12/03/2020", right=True)) == [(date(2020, 3, 12), 0.99)]
+
+
+def test_what_is_no_character_of_a_date_needs_not_be_sure() -> None:
+    dots = (0.99,) * 4 + (0.4,) + (0.99,) * 2 + (0.3,) + (0.99,) * 2
+    look = TextLook("2021.10.08", dots)
+    assert told(DOTS, TextLine((), (look, look))) == [(date(2021, 10, 8), 0.99)]
+
+
+def test_three_looks_that_agree_are_surer_than_one_and_nothing_may_contradict_them() -> None:
+    def looks(*those: tuple[str, float]) -> TextLine:
+        return TextLine((), tuple(TextLook(text, (sure,) * len(text)) for text, sure in those))
+
+    agreed = looks(("LOT B1203", 0.7), ("LOT B12", 0.9), ("LOT B1203", 0.8), ("LOT B1203", 0.6))
+    assert told(LOT, agreed) == [("B1203", 0.94)]
+    assert told(LOT, looks(("LOT B1203", 0.7), ("LOT B1203", 0.8))) == [("B1203", 0.8)]
+    assert told(LOT, looks(*[("LOT B1203", 0.99)] * 3, ("LOT B1208", 0.3)))[0][1] == 0.0
+    assert told(LOT, looks(*[("LOT B1203", 0.99)] * 2, *[("LOT B12", 0.9)] * 2))[0][1] == 0.0
+    repaired = looks(*[("LOT BI203", 0.99)] * 4)
+    assert told(LOT, repaired)[0][1] < 0.9, "however many looks take one letter for another"
+
+
+def test_another_look_is_worth_while_until_the_value_is_sure_or_nothing_is_found() -> None:
+    def worth(*texts: str, sure: float = 0.99, pattern: LabelTextConfig = DOTS) -> bool:
+        return worth_another([TextLook(text, (sure,) * len(text)) for text in texts], (pattern,))
+
+    assert worth("2021.10.08")
+    assert not worth("2021.10.08", "2021.10.08")
+    assert worth("2021.10.08", "2021.10.08", sure=0.6)
+    assert worth("2021.10.08", "2021.10.0B")
+    assert not worth("CHOCOLATE")
+    assert worth("2O2I..1008")  # dots that were not seen together, perhaps
+    assert not worth(*["2O2I..1008"] * 3)
+    assert not worth("LOT 22345 X", pattern=LOT)
 
 
 def test_the_least_sure_character_counts_and_both_looks_must_agree() -> None:
