@@ -76,6 +76,10 @@ def test_labels_give_a_verdict(folder: Path) -> None:
         ("[]", 'no list "codes"'),
         ('{"codes": [{"file": "a.png"}]}', "codes[0]"),
         ('{"codes": [{"file": "z.png", "text": "x"}]}', "z.png"),
+        ('{"texts": {}}', '"texts" is no list'),
+        ('{"texts": [{"file": "a.png", "kind": "lot"}]}', "texts[0]"),
+        ('{"texts": [{"file": "a.png", "kind": "colour", "value": "red"}]}', "texts[0].kind"),
+        ('{"texts": [{"file": "a.png", "kind": "lot", "value": "B1203"}]}', "add --text --config"),
     ],
 )
 def test_bad_labels_are_refused_in_one_line(folder: Path, text: str, words: str) -> None:

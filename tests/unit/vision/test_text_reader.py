@@ -237,6 +237,14 @@ def test_the_commands_read_photographs_and_kept_pictures(tmp_path: Path) -> None
     assert [(value["kind"], value["value"]) for value in told["values"]] == [
         ("lot", "B1203"), ("expiry", "2026-12-31"),
     ]  # fmt: skip
+    labels = tmp_path / "labels.json"
+    texts = [{"file": "A-01.png", "kind": "lot", "value": lot, "group": "ink"} for lot in ("B1203", "B1204")]
+    labels.write_text(json.dumps({"texts": texts}))
+    verdict = run.invoke(
+        app, ["codes", str(photograph), "--text", "--config", str(config), "--labels", str(labels)]
+    ).stdout
+    assert "ink: 1 of 2 values told right, 0 unknown, 1 not read" in verdict
+    assert "1 values told wrong\n  wrong A-01.png: expiry 2026-12-31" in verdict
     folder = tmp_path / "inventory"
     with SqliteStore(folder) as store:
         for place, name in (("A-01", store.keep_evidence(evidence_jpeg(shelf(*LINES)))), ("A-02", "ab" * 32)):
