@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from decimal import Decimal
+from functools import lru_cache
 from itertools import product
 from typing import Final
 
@@ -128,8 +129,10 @@ def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> _Look | N
     return _Look(value, sure, 0.0 if len(meant) > 1 or more_right or more_left else part)
 
 
-def _meant(text: str, pattern: LabelTextConfig) -> dict[Told, _Found]:
-    """Everything that a text can mean, as it stands there; else, for a date, with other separators."""
+@lru_cache(maxsize=256)
+def _meant(text: str, pattern: LabelTextConfig) -> Mapping[Told, _Found]:
+    """Everything that a text can mean, as it stands there; else, for a date, with other separators.  Looks at
+    one line mostly say the same, and it is asked after each of them."""
     readings = _readings(text, pattern) if len(text) <= _LONGEST else []
     meant: dict[Told, _Found] = {}
     for reading in readings:
