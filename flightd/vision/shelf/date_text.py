@@ -18,6 +18,7 @@ _YEARS: Final = range(2000, 2100)
 _DIGITS: Final = {"d": 2, "m": 2, "y": 2, "Y": 4, "j": 3}
 _SEPARATORS: Final = {" ": "[ .,·]{0,2}", ".": "[ .,·•-]{0,3}", "/": " ?/ ?", "-": " ?[-.] ?", "": " ?"}
 """What may be read for each: spaces have no ink, and a dot has little."""
+_A_YEAR: Final = re.compile(r"20\d\d")
 _DOTS: Final = str.maketrans(",·•", "...")
 _ONE_STROKE: Final = frozenset("OQDIl|")
 _LIKE_DIGITS: Final = _ONE_STROKE | frozenset("LZSBGTAoizsbgq")
@@ -64,16 +65,20 @@ class RespacedDate:
 
 
 def respaced(text: str, form: str) -> RespacedDate | None:
-    """The first such date in a line.  Between digits one separator at least is as the format has it, for by
-    another one they may mean another order; and beside a month's name (`NOV2021`) none is lost."""
+    """The first such date in a line.  Where all is digits, one separator at least is as the format has it: by
+    another one they may mean another order.  Beside a month's name none is lost: `NOV 2021` is no day."""
     parts = _parts(form)
     between = [at for at in range(1, len(parts)) if {parts[at - 1][1], parts[at][1]} <= _DIGITS.keys()]
     for match in _loosely(form).finditer(text):
         gaps = [match[f"gap{at}"].translate(_DOTS) for at in between]
         lost = any(parts[at][0] and not gap for at, gap in zip(between, gaps, strict=True))
         as_written = any(gap and parts[at][0].strip() in gap for at, gap in zip(between, gaps, strict=True))
-        if as_written if len(between) == len(parts) - 1 else not lost:
-            shown = "".join(literal + match[f"field{at}"] for at, (literal, _) in enumerate(parts))
+        shown = "".join(literal + match[f"field{at}"] for at, (literal, _) in enumerate(parts))
+        if len(between) == len(parts) - 1:
+            believed = as_written
+        else:
+            believed = not lost and (has_whole_year(form) or not _A_YEAR.search(shown))
+        if believed:
             return RespacedDate(match.start(), match.end(), shown, lost)
     return None
 

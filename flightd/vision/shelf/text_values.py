@@ -20,6 +20,7 @@ from typing import Final
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.label_text import TextLine, TextLook
 from flightd.core.label_values import (
+    DATES,
     LEAST_TEXT_CONFIDENCE,
     LabelValue,
     Told,
@@ -38,6 +39,8 @@ _LOST_TO_GLARE: Final = 0.2
 """And that it loses in a line that is burnt out altogether: what is left of a 9 is a 0."""
 _LONGEST: Final = 120
 """Characters of a line; what is longer is no line of a label."""
+_PLAIN_LOOKS: Final = 2
+"""The first of a line; at the others a letter of a lot may become another."""
 _AGREEING: Final = 3
 """Looks that must say the same where there are so many."""
 _DATE_DIGITS: Final = 4
@@ -47,8 +50,9 @@ _BLIND_LOOKS: Final = 2
 
 def text_values(lines: Sequence[TextLine], patterns: Sequence[LabelTextConfig]) -> tuple[LabelValue, ...]:
     """What the lines say, each value once with its confidence: that of the least sure of its characters in
-    the surest of the looks; in the surest two where three agree.  All looks of two must say the same, whole,
-    or three of more while none says something else; it is 0 otherwise, and what one of them says."""
+    the surest of two looks that say the same, whole.  A date, for which the calendar vouches, may be what
+    three of more looks say, the surest two together, while none says something else.  It is 0 otherwise, and
+    the value what one of them says."""
     found: dict[tuple[ValueKind, Told], LabelValue] = {}
     for pattern in patterns:
         for line in lines:
@@ -60,18 +64,20 @@ def text_values(lines: Sequence[TextLine], patterns: Sequence[LabelTextConfig]) 
 
 
 def worth_another(looks: Sequence[TextLook], patterns: Sequence[LabelTextConfig]) -> bool:
-    """Whether one more look at a line may make it sure: it has a value for a pattern that is not sure yet, or
-    it may be a date in dots that were not seen together."""
+    """Whether one more look at a line may make it sure: it has a value that was looked at once, a date that
+    is not sure yet, or may be a date in dots that were not seen together."""
     line = TextLine(((0.0, 0.0),) * 4, tuple(looks))
     values = text_values([line], patterns)
     if values:
-        return len(looks) < 2 or any(value.confidence < LEAST_TEXT_CONFIDENCE for value in values)
+        unsure = [value for value in values if value.confidence < LEAST_TEXT_CONFIDENCE]
+        return len(looks) < _PLAIN_LOOKS or any(value.kind in DATES for value in unsure)
     digits = max(sum(map(str.isdigit, look.text)) for look in looks)
     return len(looks) <= _BLIND_LOOKS and digits >= _DATE_DIGITS and any(one.is_date for one in patterns)
 
 
 def _value(line: TextLine, pattern: LabelTextConfig) -> LabelValue | None:
-    told = [_read(look, line, pattern) for look in line.looks]
+    looks = line.looks if pattern.is_date else line.looks[:_PLAIN_LOOKS]
+    told = [_read(look, line, pattern) for look in looks]
     telling = [one for one in told if one is not None]
     if not telling:
         return None

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import ClassVar
@@ -18,6 +20,7 @@ from flightd.cli.main import app
 from flightd.config.label_text import LabelTextConfig
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationState, Observation
+from flightd.core.label_text import TextLook
 from flightd.core.label_values import told_text
 from flightd.core.types import Image
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg
@@ -102,6 +105,10 @@ def engine(monkeypatch: pytest.MonkeyPatch) -> type[Engine]:
     return one
 
 
+def fewer_than(most: int, looks: Sequence[TextLook]) -> bool:
+    return len(looks) < most
+
+
 BLANK = np.full((120, 200, 3), 235, np.uint8)
 """No label stands out: the whole is looked at."""
 
@@ -135,8 +142,8 @@ def test_what_is_a_line_only_from_afar_is_read_and_none_twice(engine: type[Engin
 
 def test_a_line_is_looked_at_in_other_ways_as_long_as_that_is_wanted(engine: type[Engine]) -> None:
     engine.found = {120: boxes((20, 20, 80, 40))}
-    for wanted, looks in ((0, 1), (2, 2), (3, 3), (9, 4)):
-        (line,) = TextReader().read(BLANK, lambda those, most=wanted: len(those) < most)
+    for most, looks in ((0, 1), (2, 2), (3, 3), (9, 4)):
+        (line,) = TextReader().read(BLANK, partial(fewer_than, most))
         assert len(line.looks) == looks
 
 

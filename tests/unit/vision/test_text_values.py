@@ -119,6 +119,7 @@ def test_letters_that_touch_a_date_and_separators_read_otherwise_change_no_digit
         (DOTS, "7.2021. 10.08"),
         (NAMED, "NOV2021"),  # the month of a year
         (NAMED, "12 JAN 2023"),
+        (LabelTextConfig(kind="expiry", pattern=r"([A-Z]{3}\d{4})", dates=("%b%d%y",)), "12 JAN 2023"),
         (DAY, "18/02/0745"),
         (DAY, "18/02/2582"),
         (LabelTextConfig(kind="expiry", pattern=r"(\d\d\.\d\d\.\d\d)", dates=("%d.%m.%y",)), "20:12:25"),
@@ -161,17 +162,24 @@ def test_what_is_no_character_of_a_date_needs_not_be_sure() -> None:
     assert told(DOTS, TextLine((), (look, look))) == [(date(2021, 10, 8), 0.99)]
 
 
-def test_three_looks_that_agree_are_surer_than_one_and_nothing_may_contradict_them() -> None:
-    def looks(*those: tuple[str, float]) -> TextLine:
-        return TextLine((), tuple(TextLook(text, (sure,) * len(text)) for text, sure in those))
+def looks(*those: tuple[str, float]) -> TextLine:
+    return TextLine((), tuple(TextLook(text, (sure,) * len(text)) for text, sure in those))
 
-    agreed = looks(("LOT B1203", 0.7), ("LOT B12", 0.9), ("LOT B1203", 0.8), ("LOT B1203", 0.6))
-    assert told(LOT, agreed) == [("B1203", 0.94)]
-    assert told(LOT, looks(("LOT B1203", 0.7), ("LOT B1203", 0.8))) == [("B1203", 0.8)]
-    assert told(LOT, looks(*[("LOT B1203", 0.99)] * 3, ("LOT B1208", 0.3)))[0][1] == 0.0
-    assert told(LOT, looks(*[("LOT B1203", 0.99)] * 2, *[("LOT B12", 0.9)] * 2))[0][1] == 0.0
-    repaired = looks(*[("LOT BI203", 0.99)] * 4)
-    assert told(LOT, repaired)[0][1] < 0.9, "however many looks take one letter for another"
+
+def test_three_looks_that_agree_on_a_date_are_surer_than_one_and_nothing_may_contradict_them() -> None:
+    day, other, cut = "2021.10.08", "2021.10.06", "2021.10"
+    agreed = looks((day, 0.7), (cut, 0.9), (day, 0.8), (day, 0.6))
+    assert told(DOTS, agreed) == [(date(2021, 10, 8), 0.94)]
+    assert told(DOTS, looks((day, 0.7), (day, 0.8))) == [(date(2021, 10, 8), 0.8)]
+    assert told(DOTS, looks(*[(day, 0.99)] * 3, (other, 0.3)))[0][1] == 0.0
+    assert told(DOTS, looks(*[(day, 0.99)] * 2, *[(cut, 0.9)] * 2))[0][1] == 0.0
+    repaired = looks(*[("2O21.10.08", 0.99)] * 4)
+    assert told(DOTS, repaired)[0][1] < 0.9, "however many looks take a letter for the digit"
+
+
+def test_a_lot_is_what_the_first_two_looks_say() -> None:
+    assert told(LOT, looks(*[("LOT B1203", 0.7)] * 4)) == [("B1203", 0.7)]
+    assert told(LOT, looks(("LOT B12", 0.9), *[("LOT B1203", 0.99)] * 3))[0][1] == 0.0
 
 
 def test_another_look_is_worth_while_until_the_value_is_sure_or_nothing_is_found() -> None:
@@ -186,6 +194,8 @@ def test_another_look_is_worth_while_until_the_value_is_sure_or_nothing_is_found
     assert worth("2O2I..1008")  # dots that were not seen together, perhaps
     assert not worth(*["2O2I..1008"] * 3)
     assert not worth("LOT 22345 X", pattern=LOT)
+    assert worth("LOT B1203", pattern=LOT)
+    assert not worth(*["LOT B1203"] * 2, sure=0.6, pattern=LOT)
 
 
 def test_the_least_sure_character_counts_and_both_looks_must_agree() -> None:
