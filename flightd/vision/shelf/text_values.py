@@ -35,8 +35,8 @@ _MOST_READINGS: Final = 4096
 _REPAIRED: Final = 0.85
 """Part of its confidence that a value keeps in which a character was taken for one that looks like it: a cut
 J was read as an I, a 9 in glare as an O."""
-_LOST_TO_GLARE: Final = 0.2
-"""And that it loses in a line that is burnt out altogether: what is left of a 9 is a 0."""
+_LOST_TO_GLARE: Final = 0.25
+"""And that it loses in a line that is burnt out altogether: what is left of a 9 is a 0, of a Z a 7."""
 _LONGEST: Final = 120
 """Characters of a line; what is longer is no line of a label."""
 _PLAIN_LOOKS: Final = 2
