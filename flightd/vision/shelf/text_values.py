@@ -37,6 +37,8 @@ _REPAIRED: Final = 0.85
 J was read as an I, a 9 in glare as an O."""
 _LOST_TO_GLARE: Final = 0.25
 """And that it loses in a line that is burnt out altogether: what is left of a 9 is a 0, of a Z a 7."""
+_BURNT_END: Final = 0.1
+"""Glare of a line in which no character at an open end is believed: a 6 there was told as a 0."""
 _LONGEST: Final = 120
 """Characters of a line; what is longer is no line of a label."""
 _PLAIN_LOOKS: Final = 2
@@ -107,7 +109,7 @@ class _Found:
 @dataclass(frozen=True, slots=True)
 class _Look:
     """What one look tells, the probability of its least sure character, and the part of that which the line
-    leaves to it: none where something else can be meant, or the value may go on beyond what was read."""
+    leaves to it: none where something else can be meant, or its end may be cut off or burnt."""
 
     value: Told
     sure: float
@@ -120,9 +122,11 @@ def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> _Look | N
         return None
     value, found = next(iter(meant.items()))
     short = pattern.is_date and not found.whole
-    ends_right = line.gap or (line.open_right and found.end == len(look.text))
-    more_right = ends_right and (short or _fits_longer(found.shown, found.shown_end, pattern))
-    more_left = line.open_left and found.start == 0 and (short or _fits_longer(found.shown, 0, pattern))
+    at_left = line.open_left and found.start == 0
+    at_right = line.open_right and found.end == len(look.text)
+    more_left = at_left and (short or _fits_longer(found.shown, 0, pattern))
+    more_right = (at_right or line.gap) and (short or _fits_longer(found.shown, found.shown_end, pattern))
+    burnt = (at_left or at_right) and line.glare >= _BURNT_END
     repaired = look.text[found.start : found.end] != found.reading[found.start : found.end]
     part = (_REPAIRED if repaired else 1.0) * (1.0 - _LOST_TO_GLARE * line.glare)
     # what is left of another character of the value, perhaps
@@ -132,7 +136,7 @@ def _read(look: TextLook, line: TextLine, pattern: LabelTextConfig) -> _Look | N
         for character, sure in zip(look.text[found.start : end], look.sure[found.start : end], strict=True)
         if character.isalnum() or not found.whole
     )
-    return _Look(value, sure, 0.0 if len(meant) > 1 or more_right or more_left else part)
+    return _Look(value, sure, 0.0 if len(meant) > 1 or more_left or more_right or burnt else part)
 
 
 @lru_cache(maxsize=256)

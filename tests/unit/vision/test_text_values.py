@@ -243,6 +243,13 @@ def test_glare_on_the_line_makes_it_less_sure() -> None:
     assert told(LOT, replace(line("LOT B1203", "LOT B1203"), glare=0.5)) == [("B1203", 0.8662)]
 
 
+def test_what_glare_may_have_changed_at_an_open_end_is_sure_to_nobody() -> None:
+    day = replace(line("EXP 18.09.2020", "EXP 18.09.2020", right=True), glare=0.2)  # 2026, in truth
+    assert told(EXPIRY, day) == [(date(2020, 9, 18), 0.0)]
+    assert told(EXPIRY, replace(day, open_right=False))[0][1] > 0.9
+    assert told(EXPIRY, replace(day, glare=0.05))[0][1] > 0.9
+
+
 def test_one_value_on_two_lines_is_told_once_and_two_values_both() -> None:
     lines = (
         line("LOT B1203", "LOT B1203", sure=0.7),
