@@ -92,17 +92,16 @@ class TextReader:
         labels = label_regions(bgr)
         found: list[TextLine] = []
         for box in dict.fromkeys((*labels, (0, 0, width, height))):
-            x0, y0, x1, y1 = box
-            region = np.ascontiguousarray(bgr[y0:y1, x0:x1])
-            centre = (width - 1) / 2 - x0, (height - 1) / 2 - y0
-            strips = self._strips(region)
+            strips = self._strips(bgr, box)
             if box not in labels:
                 strips = [strip for strip in strips if not any(_is_inside(strip, label) for label in labels)]
-            strips = strips[: _MOST_LINES - len(found)]
-            found += [self._line(region, strip, centre, wanted) for strip in strips]
+            found += [self._line(bgr, strip, wanted) for strip in strips[: _MOST_LINES - len(found)]]
         return tuple(line for line in found if any(look.text for look in line.looks))
 
-    def _strips(self, region: Image) -> list[_Strip]:
+    def _strips(self, bgr: Image, box: Box) -> list[_Strip]:
+        """The lines in a box of the picture."""
+        x0, y0, x1, y1 = box
+        region = np.ascontiguousarray(bgr[y0:y1, x0:x1])
         found: list[_Strip] = []
         for part in _SCALES:
             scale = part * min(1.0, _LONGEST_SIDE_PX / max(region.shape[:2]))
@@ -110,33 +109,34 @@ class TextReader:
             if min(smaller.shape[:2]) < _LINE_PX // 2:
                 break
             boxes = self._engine(smaller, use_det=True, use_cls=False, use_rec=False).boxes
-            corners = [] if boxes is None else [np.asarray(box, np.float64) / scale for box in boxes]
+            corners = [] if boxes is None else [np.asarray(box) / scale + (x0, y0) for box in boxes]
             strips = sorted(map(_Strip.of, corners), key=lambda strip: (strip.middle[1], strip.middle[0]))
             lines = _joined(strips)
             found += [line for line in lines if not any(other.covers(line) for other in found)]
         return found
 
-    def _line(self, region: Image, strip: _Strip, centre: tuple[float, float], wanted: Wanted) -> TextLine:
-        looks = [self._look(strip, region, _WAYS[0])]
-        if np.mean(looks[0].sure or (0.0,)) < _ILL_READ and self._is_upside_down(strip, region):
+    def _line(self, bgr: Image, strip: _Strip, wanted: Wanted) -> TextLine:
+        looks = [self._look(strip, bgr, _WAYS[0])]
+        if np.mean(looks[0].sure or (0.0,)) < _ILL_READ and self._is_upside_down(strip, bgr):
             strip = strip.turned_round()
-            looks = [self._look(strip, region, _WAYS[0])]
+            looks = [self._look(strip, bgr, _WAYS[0])]
         for way in _WAYS[1:]:
             if not wanted(tuple(looks)):
                 break
-            looks.append(self._look(strip, region, way))
-        doubts = strip.doubts(region)
-        corners = tuple((round(x - centre[0], 1), round(y - centre[1], 1)) for x, y in strip.corners())
+            looks.append(self._look(strip, bgr, way))
+        doubts = strip.doubts(bgr)
+        cx, cy = (bgr.shape[1] - 1) / 2, (bgr.shape[0] - 1) / 2
+        corners = tuple((round(x - cx, 1), round(y - cy, 1)) for x, y in strip.corners())
         return TextLine(corners, tuple(looks), doubts.left, doubts.right, doubts.gap, round(doubts.glare, 3))
 
-    def _is_upside_down(self, strip: _Strip, region: Image) -> bool:
-        line = strip.cut_out(region, _WAYS[0].along, _WAYS[0].across)
+    def _is_upside_down(self, strip: _Strip, bgr: Image) -> bool:
+        line = strip.cut_out(bgr, _WAYS[0].along, _WAYS[0].across)
         out = self._engine(line, use_det=False, use_cls=True, use_rec=False)
         ((label, sure),) = out.cls_res
         return bool(label == "180" and sure >= _UPSIDE_DOWN)
 
-    def _look(self, strip: _Strip, region: Image, way: _Way) -> TextLook:
-        line = way.shown(strip.cut_out(region, way.along, way.across))
+    def _look(self, strip: _Strip, bgr: Image, way: _Way) -> TextLook:
+        line = way.shown(strip.cut_out(bgr, way.along, way.across))
         out = self._engine(line, use_det=False, use_cls=False, use_rec=True, return_word_box=True)
         if out is None or not out.txts or not out.word_results:
             return TextLook("", ())
@@ -187,7 +187,7 @@ class _Doubts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Strip:
-    """A line in pixels of its region: middle, direction (a unit vector to the right), length, height."""
+    """A line in pixels of its picture: middle, direction (a unit vector to the right), length, height."""
 
     middle: Matrix
     along: Matrix
@@ -225,7 +225,7 @@ class _Strip:
         d = self.down * (self.height / 2 + across_room * self.height)
         return np.array([self.middle - a - d, self.middle + a - d, self.middle + a + d, self.middle - a + d])
 
-    def cut_out(self, region: Image, along_room: float, across_room: float) -> Image:
+    def cut_out(self, bgr: Image, along_room: float, across_room: float) -> Image:
         """The strip upright, as high as the network reads."""
         corners = self.corners(along_room, across_room)
         scale = _LINE_PX / (self.height * (1 + 2 * across_room))
@@ -233,19 +233,19 @@ class _Strip:
         onto = np.array([[0, 0], [width, 0], [0, _LINE_PX]], np.float32)
         flags = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC
         turn = cv2.getAffineTransform(corners[[0, 1, 3]].astype(np.float32), onto)
-        strip = cv2.warpAffine(region, turn, (width, _LINE_PX), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        strip = cv2.warpAffine(bgr, turn, (width, _LINE_PX), flags=flags, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(strip, np.uint8)
 
-    def doubts(self, region: Image) -> _Doubts:
+    def doubts(self, bgr: Image) -> _Doubts:
         """What may be wrong with the line, whatever is read in it."""
         room = _END + 0.05
-        line = self.cut_out(region, room, 0.0)
+        line = self.cut_out(bgr, room, 0.0)
         grey = cv2.cvtColor(line, cv2.COLOR_BGR2GRAY)
         wide = max(2, round(_END * _LINE_PX))
         toned = 255 - grey if _is_light(line) else grey
         paper, ink = np.percentile(toned, (80, 5))
         outside = self.corners(room)
-        size = np.array((region.shape[1], region.shape[0]))
+        size = np.array((bgr.shape[1], bgr.shape[0]))
         inside: NDArray[np.bool_] = np.all((outside >= 0) & (outside < size), axis=1)
         smooth = np.asarray(cv2.GaussianBlur(grey, (0, 0), _SMOOTH_PX), np.uint8)
         lightest = smooth.min(axis=0)
