@@ -72,7 +72,7 @@ def respaced(text: str, form: str) -> RespacedDate | None:
     for match in _loosely(form).finditer(text):
         gaps = [match[f"gap{at}"].translate(_DOTS) for at in between]
         lost = any(parts[at][0] and not gap for at, gap in zip(between, gaps, strict=True))
-        as_written = any(gap and parts[at][0].strip() in gap for at, gap in zip(between, gaps, strict=True))
+        as_written = any(gap and parts[at][0] in gap for at, gap in zip(between, gaps, strict=True))
         shown = "".join(literal + match[f"field{at}"] for at, (literal, _) in enumerate(parts))
         if len(between) == len(parts) - 1:
             believed = as_written

@@ -175,8 +175,7 @@ def _as_it_stands(reading: str, pattern: LabelTextConfig) -> Iterator[tuple[Told
     if match is None or match[1] is None:
         return
     start, end = match.span(1)
-    before = reading[start - 1 : start] if start and start == match.start() else ""
-    after = reading[end : end + 1]
+    before, after = reading[:start] if start == match.start() else "", reading[end:]
     found = _Found(start, end, reading, reading, end)
     if pattern.is_date:
         for form in pattern.dates:

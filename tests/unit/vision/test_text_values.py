@@ -115,6 +115,7 @@ def test_letters_that_touch_a_date_and_separators_read_otherwise_change_no_digit
         (SPACES, "EXP 20210808"),
         (DOTS, "2021 10 08"),  # in another order, perhaps
         (DASHES, "03.04.2021"),
+        (LabelTextConfig(kind="expiry", pattern=r"(\d\d \d\d \d{4})", dates=("%m %d %Y",)), "03.04.2021"),
         (DOTS, "2021.1008"),  # a number of something
         (DOTS, "7.2021. 10.08"),
         (NAMED, "NOV2021"),  # the month of a year
