@@ -37,7 +37,7 @@ _REPAIRED: Final = 0.85
 J was read as an I, a 9 in glare as an O."""
 _LOST_TO_GLARE: Final = 0.25
 """And that it loses in a line that is burnt out altogether: what is left of a 9 is a 0, of a Z a 7."""
-_BURNT_END: Final = 0.1
+_BURNT_END: Final = 0.2
 """Glare of a line in which no character at an open end is believed: a 6 there was told as a 0."""
 _LONGEST: Final = 120
 """Characters of a line; what is longer is no line of a label."""
