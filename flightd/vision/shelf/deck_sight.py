@@ -55,7 +55,7 @@ def deck_sight(raster: Image, white: float, opening: PlaceOpening) -> DeckSight:
     """What is seen of the deck in an opening's raster, (rows, columns, 3) BGR, of a picture of that white
     level."""
     columns = raster.shape[1]
-    ends_m = _ends_m(columns, opening)
+    ends_m = sight_ends_m(columns, opening)
     tone = _tone(raster, white, opening, ends_m)
     if tone is None:
         return DeckSight(np.zeros(columns, np.bool_), np.zeros(columns, np.bool_))
@@ -75,7 +75,7 @@ def deck_sight(raster: Image, white: float, opening: PlaceOpening) -> DeckSight:
     return DeckSight(is_lit, has_edge & is_lit & (ends_m < _BEHIND_M) & (whole_m >= all_m))
 
 
-def _ends_m(columns: int, opening: PlaceOpening) -> Floats:
+def sight_ends_m(columns: int, opening: PlaceOpening) -> Floats:
     """(columns,) metres behind the rack's face at which the line of sight leaves the opening at one of its
     ends, as near as the pose may have it."""
     eye_m, _, before_m = opening.eye_m

@@ -18,8 +18,9 @@ from flightd.core.inventory import PlaceFill
 from flightd.core.scanning import PlaceOpening
 from flightd.core.types import Image
 from flightd.vision.shelf.case_grid import case_grid
-from flightd.vision.shelf.deck_sight import deck_sight
-from flightd.vision.shelf.front_depth import FrontDepths
+from flightd.vision.shelf.deck_sight import deck_sight, sight_ends_m
+from flightd.vision.shelf.footing import footing
+from flightd.vision.shelf.front_depth import FrontDepths, deck_edge_m
 from flightd.vision.shelf.front_lean import front_lean_m
 from flightd.vision.shelf.goods_front import CLEAR_M, LOW_M, SIDE_DEPTH_M, equal_runs, fronts_m
 from flightd.vision.shelf.opening_raster import (
@@ -125,8 +126,11 @@ def measure(
     columns = slice(left, raster.shape[1] - right)
     whole = brightest(raster).astype(np.float32) / np.float32(white)
     deck = round(BELOW_M / ROW_M)
-    above = whole[deck + round(CLEAR_M / ROW_M) :, columns]
-    tops_m = fronts_m(above, opening, left)
+    seen = np.maximum(raster[:, columns], 1).astype(np.float32) / np.float32(white)
+    sight_m = sight_ends_m(raster.shape[1], opening)[columns]
+    foot = footing(seen, opening, deck_edge_m(raster[:, columns]), sight_m)
+    colours = seen[deck + round(CLEAR_M / ROW_M) :]
+    tops_m = fronts_m(colours, opening, left, foot)
     if any(_is_lost(code, whole[deck:], tops_m, left) for code in codes_m):
         return UNKNOWN
     room = whole[deck:, columns]
@@ -139,7 +143,6 @@ def measure(
     is_clear = int(goods.sum()) < _GOODS_COLUMNS
     depths = FrontDepths(raster[:, columns], whole[:, columns], opening, tops_m < LOW_M)
     _, eye_m, before_m = opening.eye_m
-    colours = np.maximum(raster[deck + round(CLEAR_M / ROW_M) :, columns], 1).astype(np.float32) / white
     area, doubt, out_m = 0.0, 0.0, 0.0
     leans_m: list[float | None] = []
     cases = case_grid(square, white, np.where(tops_m >= _GOODS_M, tops_m, 0.0), left, codes_m)

@@ -21,7 +21,8 @@ _FOOT_DEPTH_M: Final = 0.45
 _LEAST_FOOT_M: Final = 0.02
 """How deep fronts are looked for, and the strip of the deck up to there below which none is."""
 _OFF_M: Final = 0.03
-"""So far the deck's edge is looked for from its place."""
+_FAR_OFF_M: Final = 0.05
+"""So far the deck's edge is looked for from its place, and where only a coarse look at it is taken."""
 _SAME_HUE: Final = 0.06
 """Parts of red, green and blue in a colour that differ by no more are those of one thing."""
 _EDGE_PART: Final = 0.75
@@ -71,14 +72,21 @@ class FrontDepths:
         return before_m * strip_m / (eye_m - strip_m)
 
 
+def deck_edge_m(raster: Image) -> float | None:
+    """Where the deck's edge is seen, above where the pose has it, by an opening's raster, (rows, columns, 3)
+    BGR; None where it is not."""
+    known_m = _known(_beam_edge(raster, _FAR_OFF_M))
+    return float(np.quantile(known_m, _EDGE_PART)) if len(known_m) >= _LEAST_COLUMNS else None
+
+
 def _known(values: Floats) -> Floats:
     return values[np.isfinite(values)]
 
 
-def _beam_edge(raster: Image) -> Floats:
+def _beam_edge(raster: Image, off_m: float = _OFF_M) -> Floats:
     """(columns,) metres above the deck's place at which the beam's face ends, NaN where it is not told from
     what is above."""
-    deck, off = round(BELOW_M / ROW_M), round(_OFF_M / ROW_M)
+    deck, off = round(BELOW_M / ROW_M), round(off_m / ROW_M)
     colours = raster[: deck + off + 2].astype(np.float32) + 1.0
     hues = colours / colours.sum(axis=2, keepdims=True)
     beam = np.median(hues[: deck - off], axis=(0, 1))

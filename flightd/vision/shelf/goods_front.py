@@ -3,7 +3,8 @@
 Fronts show the aisle's light; what lies behind them, beside them and on top of them (the deck, the goods'
 own sides, the mesh, the roof) is in the shade.  So a front goes from the deck up to where it is brighter
 below than above, columns beside each other alike unless the picture says otherwise.  Dim fronts are told from
-sides by where sides can be seen, and from the hall past the rack by their structure.
+sides by where sides can be seen, from the hall past the rack by their structure and by where the deck is seen
+(`footing`), and from what is behind by their outline (`dim_fronts`).
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.scanning import PlaceOpening
-from flightd.vision.shelf.opening_raster import COLUMN_M, ROW_M, deck_strip_m
+from flightd.vision.shelf.dim_fronts import risen
+from flightd.vision.shelf.footing import Footing
+from flightd.vision.shelf.opening_raster import COLUMN_M, ROW_M, deck_strip_m, largest
 
 Floats: TypeAlias = NDArray[np.float32]
 Indices: TypeAlias = NDArray[np.intp]
@@ -53,9 +56,11 @@ _EDGE_M: Final = 0.025
 """So far from an edge it looks like structure."""
 
 
-def fronts_m(level: Floats, opening: PlaceOpening, left: int) -> Floats:
+def fronts_m(colours: Floats, opening: PlaceOpening, left: int, foot: Footing) -> Floats:
     """(columns,) metres above the deck at which the front ends in each column of the opening, as it is seen;
-    `left` columns are left out before the first."""
+    `left` columns are left out before the first.  `colours`, (rows, columns, 3), are of the rows from
+    `CLEAR_M` above the deck on as parts of white, `foot` is what is seen of the deck."""
+    level = largest(colours)
     bright, *dims = (tops.astype(np.intp) for tops in _tops(level, (_BRIGHT, *_DIM)))
     x_m = (np.arange(len(bright)) + left + 0.5) * COLUMN_M - opening.width_m / 2
     fine = np.abs(level - cv2.blur(level, (1, _FINE_ROWS)))
@@ -82,6 +87,8 @@ def fronts_m(level: Floats, opening: PlaceOpening, left: int) -> Floats:
             known = int(np.median(fronts[more]))
             if _structured(fine[:, more], known, top) > known:
                 fronts[more] = top
+    fronts[foot.is_free & beside] = 0  # it is the hall, or stands in the next places
+    fronts = risen(fronts, colours, foot.stands, (low, high))
     return np.where(fronts > 0, fronts * np.float32(ROW_M) + np.float32(CLEAR_M), np.float32(0.0)).astype(
         np.float32
     )

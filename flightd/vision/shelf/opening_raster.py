@@ -6,6 +6,7 @@ from typing import Final
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from flightd.core.geometry import Matrix
 from flightd.core.scanning import PlaceOpening
@@ -38,6 +39,12 @@ def brightest(bgr: Image) -> Image:
     """(H, W) of a picture, (H, W, 3) BGR: the largest of each pixel's three parts."""
     blue, green, red = cv2.split(bgr)
     return np.asarray(cv2.max(cv2.max(blue, green), red), np.uint8)
+
+
+def largest(parts: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(H, W) of (H, W, 3): the largest of each pixel's three parts."""
+    blue, green, red = cv2.split(parts)
+    return np.asarray(cv2.max(cv2.max(blue, green), red), np.float32)
 
 
 def in_columns(square: Image) -> Image:

@@ -195,6 +195,17 @@ def test_goods_as_dark_as_the_rack_are_unknown() -> None:
     assert told((-0.3, 0.3, 0.5, 0.0), colour=DARK)[0] is None
 
 
+BLACK: Colour = (60, 60, 62)
+
+
+def test_a_black_box_beside_a_white_one_on_a_light_pallet_counts_in_its_whole_height() -> None:
+    shelf = Shelf()
+    shelf.box((-0.25, 0.2, 0.45, 0.02), BLACK)
+    shelf.box((-0.25, 0.2, 0.1, 0.02))
+    shelf.box((0.0, 0.2, 0.45, 0.02), (205, 208, 210))
+    assert seen(shelf).fill.share == pytest.approx(share_of((-0.25, 0.2, 0.45, 0.0)), abs=0.05)
+
+
 def test_a_code_above_all_that_was_found_makes_the_share_unknown() -> None:
     low = (-0.3, 0.3, 0.1, 0.0)
     assert told(low)[0] is not None
