@@ -54,6 +54,11 @@ _LOST_END_PX: Final = 10
 _LOST_PX: Final = 12
 """So many columns in a row, at an end or within, that have nothing darker (grey levels, noise smoothed) are
 where glare may have taken characters."""
+_LETTER_PX: Final = 24
+_FAINT: Final = 0.5
+_FAINT_GLARE: Final = 0.1
+"""Where the glare of a line is more, it ends in glare if the ink of its last character is fainter than that
+part of all ink's: what came after it may be burnt out altogether."""
 
 
 Wanted: TypeAlias = Callable[[tuple[TextLook, ...]], bool]
@@ -249,13 +254,19 @@ class _Strip:
         inside: NDArray[np.bool_] = np.all((outside >= 0) & (outside < size), axis=1)
         smooth = np.asarray(cv2.GaussianBlur(grey, (0, 0), _SMOOTH_PX), np.uint8)
         lightest = smooth.min(axis=0)
+        glare = float((grey >= _BURNT).mean())
         ends = []
-        for end, corners in ((slice(wide), inside[[0, 3]]), (slice(-wide, None), inside[[1, 2]])):
+        for end, letter, corners in (
+            (slice(wide), slice(wide, wide + _LETTER_PX), inside[[0, 3]]),
+            (slice(-wide, None), slice(-wide - _LETTER_PX, -wide), inside[[1, 2]]),
+        ):
             dark = float(np.percentile(toned[:, end], 5)) < paper - 0.5 * (paper - ink)
             columns = lightest[:_LOST_END_PX] if end.start is None else lightest[-_LOST_END_PX:]
-            ends.append(bool(dark or not corners.all() or columns.min() >= _WHITE))
+            faint = glare >= _FAINT_GLARE and (
+                float(np.percentile(toned[:, letter], 5)) > paper - _FAINT * (paper - ink)
+            )
+            ends.append(bool(dark or faint or not corners.all() or columns.min() >= _WHITE))
         within = lightest[_LOST_END_PX:-_LOST_END_PX] >= _WHITE
-        glare = float((grey >= _BURNT).mean())
         return _Doubts(ends[0], ends[1], _longest_run(within) >= _LOST_PX, glare)
 
     def with_piece(self, other: _Strip) -> _Strip:

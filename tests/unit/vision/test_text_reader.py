@@ -237,6 +237,17 @@ def test_light_letters_on_dark_goods_have_plain_ends() -> None:
     assert any(line.open_left for line in TextReader().read(picture))
 
 
+def test_a_line_whose_last_letter_fades_into_glare_may_go_on_there(engine: type[Engine]) -> None:
+    engine.found = {120: boxes((20, 40, 116, 60))}
+    for faint, burnt, is_open in ((70, 255, False), (190, 255, True), (190, 235, False)):
+        picture = np.full((120, 200, 3), 235, np.uint8)
+        cv2.rectangle(picture, (90, 30), (150, 52), (burnt,) * 3, cv2.FILLED)
+        for x in range(24, 110, 16):
+            cv2.rectangle(picture, (x, 42), (x + 6, 58), (faint if x > 100 else 60,) * 3, cv2.FILLED)
+        (line,) = TextReader().read(picture)
+        assert (line.open_left, line.open_right) == (False, is_open)
+
+
 def test_the_commands_read_photographs_and_kept_pictures(tmp_path: Path) -> None:
     pytest.importorskip("rapidocr")
     config = tmp_path / "hall-flight.toml"
