@@ -12,6 +12,7 @@ from typing import Generic, TypeVar
 from flightd.core.errors import TransientError
 from flightd.runtime.durable_files import replace_file
 from flightd.runtime.latest_slot import Latest
+from flightd.runtime.within import Within
 
 T = TypeVar("T")
 
@@ -46,7 +47,7 @@ class KeptFile(Generic[T]):
         except asyncio.CancelledError:
             # ending comes before saving what a disk refuses, or takes too long for
             with contextlib.suppress(TransientError, TimeoutError):
-                async with asyncio.timeout(_LAST_WRITE_S):
+                async with Within(_LAST_WRITE_S):
                     await asyncio.to_thread(self._write)
             raise
 

@@ -27,6 +27,7 @@ from flightd.ground.hub import Hub
 from flightd.ground.mqtt.broker_address import BrokerAddress
 from flightd.ground.mqtt.managed_drone import MANUFACTURER, ManagedDrone, OrderRules
 from flightd.ground.mqtt.vehicle_sides import VehicleSides
+from flightd.runtime.within import Within
 
 MANAGER: Final = Identity("fleet manager", Role.OPERATOR, "mqtt")
 """Whose orders they are, in the audit."""
@@ -81,7 +82,7 @@ class DroneAtBroker:
             finally:
                 self._drone.at_broker = False
                 with contextlib.suppress(aiomqtt.MqttError, TimeoutError):
-                    async with asyncio.timeout(_LEAVE_S):
+                    async with Within(_LEAVE_S):
                         gone = vehicle.connection(ConnectionState.OFFLINE, self._drone.now())
                         await self._publish(client, gone)
 
@@ -163,7 +164,7 @@ async def _answered(wait: Awaitable[object], within_s: float = _ANSWER_S) -> Non
     """Wait for the broker; MqttError where it takes too long.  The client's own bound is `asyncio.wait_for`,
     which before Python 3.12 loses a cancellation that comes together with the answer."""
     try:
-        async with asyncio.timeout(within_s):
+        async with Within(within_s):
             await wait
     except TimeoutError:
         raise aiomqtt.MqttError("no answer in time") from None

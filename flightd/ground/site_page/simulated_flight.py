@@ -22,6 +22,7 @@ from flightd.adapters.ground_link.client import Address
 from flightd.core.errors import RunError, UnavailableError
 from flightd.ground.shown_text import shown
 from flightd.runtime.free_ports import free_ports
+from flightd.runtime.within import Within
 
 SIMULATOR: tuple[str, ...] = (sys.executable, "-m", "flightd", "sim", "--speed", "1")
 """What is started: by the clock, since in lockstep a drone has no ground link."""
@@ -170,18 +171,20 @@ class SimulatedFlight:
 
 async def _is_over(process: asyncio.subprocess.Process, within_s: float) -> bool:
     with contextlib.suppress(TimeoutError):
-        async with asyncio.timeout(within_s):
+        async with Within(within_s):
             await process.wait()
     return process.returncode is not None
 
 
 async def _ended(process: asyncio.subprocess.Process) -> None:
     """Have it end in order, and kill it with all that it started where it does not."""
-    if process.returncode is None:
-        process.terminate()
-        await _is_over(process, _END_S)
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)  # its world and detectors, should it have left them
+    try:
+        if process.returncode is None:
+            process.terminate()
+            await _is_over(process, _END_S)
+    finally:
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)  # its world and detectors, should it have left them
     await _is_over(process, _KILLED_S)
 
 

@@ -25,6 +25,7 @@ from flightd.adapters.vehicle.mavlink.services.commands import Answer
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, Demand, LandedState
 from flightd.ports import Clock
+from flightd.runtime.within import Within
 
 _LOG = logging.getLogger(__name__)
 
@@ -262,7 +263,7 @@ class ModeArmingManager:
         else:
             self._authority.ask(self._firmware.landing_mode, self._telemetry.custom_mode)
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(_HAND_BACK_S):
+            async with Within(_HAND_BACK_S):
                 await self._commander.send(command, *params, patience_s=_HAND_BACK_ANSWER_S)
 
     async def _step(self, demand: Demand) -> None:

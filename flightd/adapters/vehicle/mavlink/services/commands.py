@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.adapters.vehicle.mavlink.link.codec import COMPANION, Message
 from flightd.adapters.vehicle.mavlink.link.connection import MavlinkLink
+from flightd.runtime.within import Within
 
 _RESULTS = {
     dialect.MAV_RESULT_ACCEPTED: "accepted",
@@ -84,7 +85,7 @@ class Commander:
         self._post(command, confirmation, params)
         waiting = self._waiting[command] = asyncio.get_running_loop().create_future()
         try:
-            async with asyncio.timeout(patience_s):
+            async with Within(patience_s):
                 result: int = await waiting
         except TimeoutError:
             return None
