@@ -118,9 +118,9 @@ class SharedFolder:
 
     def _make(self, name: str) -> None:
         """The folder of ours in which a file shall be."""
-        parent = str(PurePosixPath(name).parent)
         if self._is_bucket:
             return
+        parent = str(PurePosixPath(name).parent)
         if parent != "." and not self._files.isdir(self._at(parent)):
             self._files.makedirs(self._at(parent), exist_ok=True)
 

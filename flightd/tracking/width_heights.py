@@ -68,7 +68,7 @@ class WidthHeights:
         share = told_m / nearest_m
         change = self._change(nearest_m, share)
         dt_s = min((stamp_ns - self._stamp_ns) * 1e-9, _LONGEST_S)
-        gain = 1.0 - math.exp(-dt_s / _MEMORY_S)
+        gain = _gain(dt_s)
         self._stamp_ns = stamp_ns
         goes_on = change < _LEAP + _LEAP_PER_S * dt_s
         if agrees or (self._judged and goes_on):
@@ -103,6 +103,11 @@ class WidthHeights:
         return self.share if abs(self.share - 1.0) > _DOUBTED else 1.0
 
 
+def _gain(dt_s: float) -> float:
+    """Of a frame that much after the last one, in a mean over the memory."""
+    return 1.0 - math.exp(-dt_s / _MEMORY_S)
+
+
 class _Watched:
     """The share of the height by widths as which one is told, of lines that are not believed yet."""
 
@@ -114,7 +119,7 @@ class _Watched:
     def steady_share(self, share: float, dt_s: float, needed_s: float) -> float | None:
         """Take one frame's, `dt_s` after the last; None until it was the same for so long."""
         mean = share if self._mean is None else self._mean
-        gain = 1.0 - math.exp(-dt_s / _MEMORY_S)
+        gain = _gain(dt_s)
         self._lasted_s += dt_s
         self._mean = mean + gain * (share - mean)
         self._strays += gain * (abs(share / mean - 1.0) - self._strays)

@@ -12,6 +12,7 @@ from flightd.app.log_study.sources import log_sources
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.ground_store.open_store import opened_store
 from flightd.ground.shared_folder import SharedFolder
+from tests.rigs.drop_folders import check_files_come_and_go
 from tests.rigs.extras import of_extra
 
 of_extra("s3fs", "s3")
@@ -51,19 +52,8 @@ def test_pictures_of_a_store_lie_in_a_bucket(bucket: str, files: Any, tmp_path: 
 def test_files_of_a_drop_folder_come_and_go(bucket: str, files: Any) -> None:
     files.pipe_file("hall-3/drop/a.csv", b"a" * 100)
     there = SharedFolder(f"{bucket}/drop", Path("wms.toml"), "expected.inbox")
-    first = there.listed()["a.csv"]
-    assert (first[0], there.listed("done")) == (100, {})
-    files.pipe_file("hall-3/drop/a.csv", b"b" * 100)
-    assert there.listed()["a.csv"] != first  # of the same size, within the second that S3 tells
-    assert there.read("a.csv", 1_000) == b"b" * 100
-    there.move("a.csv", "taking/a.csv")
-    for content in (b"first", b"then"):
-        there.write("done/a.csv.txt", content)
-    with pytest.raises(
-        UnavailableError, match=r"wms.toml: expected.inbox: s3://hall-3/drop: a.csv cannot be read: "
-    ):
-        there.read("a.csv", 1)
-    there.close()
+    # of the same size, within the second that S3 tells
+    check_files_come_and_go(there, lambda data: files.pipe_file("hall-3/drop/a.csv", data), 100, b"b" * 100)
     assert files.find("hall-3/drop") == ["hall-3/drop/done/a.csv.txt", "hall-3/drop/taking/a.csv"]
     assert files.cat_file("hall-3/drop/done/a.csv.txt") == b"then"
 

@@ -10,6 +10,7 @@ import pytest
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.ground_store.open_store import opened_store
 from flightd.ground.shared_folder import PASSWORD, SharedFolder
+from tests.rigs.drop_folders import check_files_come_and_go
 from tests.rigs.extras import of_extra
 
 of_extra("paramiko", "exchange")
@@ -37,19 +38,7 @@ def test_files_come_and_go(host: str, tmp_path: Path) -> None:
     drop.mkdir()
     (drop / "a.csv").write_bytes(b"a" * 100_000)
     there = folder(f"{host}{drop}")
-    (size, time) = there.listed()["a.csv"]
-    assert (size, there.listed("done")) == (100_000, {})
-    (drop / "a.csv").write_bytes(b"b" * 100_001)
-    assert there.listed()["a.csv"] != (size, time)
-    assert there.read("a.csv", 100_001) == b"b" * 100_001
-    there.move("a.csv", "taking/a.csv")
-    for content in (b"first", b"then"):
-        there.write("done/a.csv.txt", content)
-    with pytest.raises(
-        UnavailableError, match=r"wms.toml: expected.inbox: sftp://.*: a.csv cannot be read: "
-    ):
-        there.read("a.csv", 1)
-    there.close()
+    check_files_come_and_go(there, (drop / "a.csv").write_bytes, 100_000, b"b" * 100_001)
     found = {str(file.relative_to(drop)) for file in drop.rglob("*") if file.is_file()}
     assert found == {"taking/a.csv", "done/a.csv.txt"}
     assert (drop / "done" / "a.csv.txt").read_bytes() == b"then"
