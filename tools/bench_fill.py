@@ -2,6 +2,7 @@
 
 `python -m tools.bench_fill --sites 6` prints the share of places within 10 points, of those unknown, and the
 worst, how far it is off how goods stand out and lean, and how many empty places were told as such.
+`--uneven` lights each level of a rack front otherwise, the camera set for the one that it looks at.
 `--aside 0.3` takes the pictures of each view from places so far apart along the aisle, and decides as in
 passing; `--pictures 8` so many, at most, of each.  With `--cartons 0.8` so large a part of the places that
 are filled wholly holds cartons of one kind (`--in-part 0.2` fills so many others in part), and it is said of
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import math
 import random
+import statistics
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -29,10 +31,13 @@ from flightd.mission.scan.sweep_votes import SweepVotes, Undecided
 from flightd.mission.scan.views import View, ViewPlanner
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
+from flightd.sim.racks.face_light import drawn_light
 from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.racks.stock import StockPlace, StockShares, StockSituation, stock
 from flightd.sim.racks.stock_truth import boxes_of
+from flightd.sim.sensors.optics import Taking
+from flightd.sim.unknowns import SPREADS, WorldKind
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
 from flightd.vision.shelf.shelf_look import read_shelf
@@ -41,6 +46,7 @@ _SITE = Path(__file__).parents[1] / "configs" / "site-racks.toml"
 _WITHIN = 0.10
 _EMPTY_SHARE = 0.02
 _EXPOSURES = (0.7, 0.85, 1.0)
+_LIGHT = SPREADS[WorldKind.ROUGH].darkest_face, SPREADS[WorldKind.ROUGH].lightest_face
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +129,7 @@ class PassingVotes:
 @dataclass(frozen=True, slots=True)
 class Looks:
     """How places are looked at: at `nodes` of a site, by so many `pictures` of a view, `aside_m` apart; so
-    large a part of the places is `empty`."""
+    large a part of the places is `empty`; `uneven`: the light differs by level, as it does in the rough world."""
 
     nodes: int = 2
     pictures: int = 3
@@ -131,6 +137,7 @@ class Looks:
     empty: float = StockShares().empty
     in_part: float = 0.75
     cartons: float = 0.0
+    uneven: bool = False
     params: ScanConfig = field(default_factory=lambda: ScanConfig(max_height_m=4.0))
 
     def votes(self, site: Site, code: str, node: str) -> StopVotes | PassingVotes:
@@ -150,6 +157,7 @@ def told_places(site: Site, seed: int, looks: Looks) -> Iterator[Told]:
         cartons=looks.cartons,
         exposure=rng.choice(_EXPOSURES),
         noise=rng.choice((2.0, 3.0)),
+        light=drawn_light(site, _LIGHT, seed) if looks.uneven else {},
     )
     places = stock(site, look.shares, camera.lens.fx_px, seed, look.in_part, look.cartons)
     sight = FrontSight(camera.lens, camera.mount)
@@ -162,7 +170,7 @@ def told_places(site: Site, seed: int, looks: Looks) -> Iterator[Told]:
             for number in range(looks.pictures):
                 aside_m = (number - looks.pictures // 2) * looks.aside_m
                 hover, pose = _poses(rng, view, number + 1, aside_m)
-                picture = renderer.render(hover, number)
+                picture = renderer.render(hover, number, how=Taking(exposure=_exposure(site, look, view)))
                 codes, _ = read_shelf(picture, number, number, assigner.places(pose, view.locations))
                 seen = assigner.look(codes, pose, (view.aisle, view.side))
                 shown = {place.location: place for place in codes.places}
@@ -175,6 +183,12 @@ def told_places(site: Site, seed: int, looks: Looks) -> Iterator[Told]:
                     yield Told(code, seed, found.state, found.fill, places[code])
                 else:
                     yield Told(code, seed, None, None, places[code])
+
+
+def _exposure(site: Site, look: RackAppearance, view: View) -> float:
+    """What a camera is set to that has learnt how the levels that it looks at are lit."""
+    fronts = {f"{view.aisle} {view.side.value} {site.locations[code].level}" for code in view.locations}
+    return 1.0 / statistics.geometric_mean(look.light.get(front, 1.0) for front in fronts)
 
 
 def _poses(rng: random.Random, view: View, stamp_ns: int, aside_m: float) -> tuple[Kinematics, BodyPose]:
@@ -265,6 +279,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=100, help="of the first")
     parser.add_argument("--aside", type=float, default=0.0, help="metres between the pictures of a view")
     parser.add_argument("--pictures", type=int, default=usual.pictures, help="of each view, at most")
+    parser.add_argument("--uneven", action="store_true", help="each level is lit otherwise")
     parser.add_argument("--empty", type=float, default=usual.empty, help="part of the places that is empty")
     parser.add_argument("--in-part", type=float, default=usual.in_part, help="of the others, in stacks")
     parser.add_argument(
@@ -273,7 +288,15 @@ def main() -> None:
     asked = parser.parse_args()
     cv2.setNumThreads(1)
     site, begun = load_site(_SITE), time.process_time()
-    looks = Looks(asked.nodes, asked.pictures, asked.aside, asked.empty, asked.in_part, asked.cartons)
+    looks = Looks(
+        asked.nodes,
+        asked.pictures,
+        asked.aside,
+        asked.empty,
+        asked.in_part,
+        asked.cartons,
+        uneven=asked.uneven,
+    )
     told: list[Told] = []
     for seed in range(asked.seed, asked.seed + asked.sites):
         told += told_places(site, seed, looks)

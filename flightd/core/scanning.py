@@ -71,7 +71,9 @@ class Place:
     the cell, which goods cover if there are any; and the front part of the deck below the core, which an
     empty place shows (its far end above its near one; empty where it cannot be in the picture).  `opening` is
     None where it is not in the picture.  `kept` is what the picture is worth that there is of it: none is
-    made that is worth no more."""
+    made that is worth no more.  Places of one `level` are lit alike, others may not be: `lit_px` is the part
+    of the cell that has the light of its own level, from the beam with its label up to the next beam; empty:
+    the whole cell."""
 
     location: str
     quad_px: Quad
@@ -80,6 +82,8 @@ class Place:
     deck_px: Quad = ()
     opening: PlaceOpening | None = None
     kept: PictureWorth = NO_PICTURE
+    level: int = 0
+    lit_px: Quad = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +91,8 @@ class PlaceLook:
     """What one picture shows of one location; `evidence` names the picture of it (SHA-256), empty
     where none was made.
     `fill` is None where it shows too little of the opening; `code` says whether a code is there that is not
-    the location's own label."""
+    the location's own label; `white` is as in `CodeSet`, by the labels on the location's level alone, None
+    where the picture shows none."""
 
     location: str
     quad_px: Quad
@@ -97,6 +102,7 @@ class PlaceLook:
     light: Light = Light.FAIR
     fill: PlaceFill | None = None
     code: bool = False
+    white: float | None = None
 
     @property
     def worth(self) -> PictureWorth:

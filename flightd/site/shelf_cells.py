@@ -23,6 +23,8 @@ _DECK_SEEN_M = 0.3
 """How deep the deck of an empty place is looked at."""
 _BEAM_M, _MOST_BEAM = 0.10, 0.5
 """Height of the beam below a deck, and the most of the way from deck to deck that it takes."""
+_BESIDE_M = 0.06
+"""A place is known so well in height, and how it is lit goes over into how the next is."""
 _NEXT_M = 0.5
 """Height above the topmost labels that still belongs to their level where the shelf does not end before."""
 
@@ -51,6 +53,14 @@ class Cell:
     def opening_m(self) -> tuple[tuple[float, float, float], ...]:
         """(x, y, height) of the room for goods at the front, corners in the order of `core_m`."""
         return self._corners(self.x0_m, self.x1_m, self.deck_m, self.top_m)
+
+    @property
+    def lit_m(self) -> tuple[tuple[float, float, float], ...]:
+        """(x, y, height) of what has the light of the location's own level: the opening with the beam below,
+        well below the next one, which is lit as its own level is; corners in the order of `core_m`."""
+        return self._corners(
+            self.x0_m, self.x1_m, max(self.deck_m - _BEAM_M, 0.0), max(self.top_m - _BESIDE_M, self.label_m)
+        )
 
     @property
     def deck_corners_m(self) -> tuple[tuple[float, float, float], ...]:

@@ -113,14 +113,17 @@ class Assigner:
         found = []
         for code in locations:
             cell = self.cells[code]
-            pixels = view.project(np.array([*cell.corners_m, *cell.core_m, *cell.deck_corners_m]))
-            if not np.isfinite(pixels[:8]).all():
+            corners_m = *cell.corners_m, *cell.core_m, *cell.lit_m, *cell.deck_corners_m
+            pixels = view.project(np.array(corners_m))
+            if not np.isfinite(pixels[:12]).all():
                 continue
             share = _inside_share(pixels[:4], lens)
             if share >= _LEAST_SHARE:
-                quad, core = _quad(pixels[:4], lens), _quad(pixels[4:8], lens)
-                deck = _quad(pixels[8:], lens) if np.isfinite(pixels[8:]).all() else ()
-                found.append(Place(code, quad, round(share, 3), core, deck, _opening(cell, view)))
+                quad, core, lit = (_quad(pixels[i : i + 4], lens) for i in (0, 4, 8))
+                deck = _quad(pixels[12:], lens) if np.isfinite(pixels[12:]).all() else ()
+                level, opening = self._locations[code].level, _opening(cell, view)
+                place = Place(code, quad, round(share, 3), core, deck, opening, level=level, lit_px=lit)
+                found.append(place)
         return tuple(found)
 
     def look(self, codes: CodeSet, pose: BodyPose, front: tuple[str, Side]) -> ShelfLook:

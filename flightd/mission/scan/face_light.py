@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -142,20 +142,21 @@ class FaceLight:
 
     def take(
         self,
-        faces: Collection[Face],
+        whites: Mapping[Face, float | None],
         wanted: Shot,
         taken: tuple[float, float],
-        white: float | None,
         usual: float,
     ) -> None:
-        """One picture of these fronts: it was `wanted` so, and `taken` with these parts of the usual exposure
-        and gain; `white` as in `CodeSet`.  `usual` is the light that was planned for them."""
+        """One picture of some fronts: it was `wanted` so, and `taken` with these parts of the usual exposure
+        and gain; `whites`, as in `CodeSet`, by front.  `usual` is the light that was planned for them."""
         self._exposes.note(wanted.exposure, taken[0])
         self._gains.note(wanted.gain, taken[1])
-        if white is None or not self._exposes:
+        if not self._exposes:
             return
         light = taken[0] * taken[1]
-        for face in faces:
+        for face, white in whites.items():
+            if white is None:
+                continue
             lit = self._faces.setdefault(face, _Lit(usual))
             lit.per_light.append((_BURNT_AS if white >= _BURNT else max(white, _BLACK)) / light)
             if len(lit.per_light) == _PICTURES:

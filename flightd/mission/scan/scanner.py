@@ -350,6 +350,12 @@ class Scanner:
         assert self._sweeps is not None
         return LegLight(leg.speed_mps, leg.exposure, self._sweeps.sharp_mps)
 
+    def _whites(self, leg: SweepLeg, codes: CodeSet) -> dict[Face, float | None]:
+        """What white paper came out as, by front: by the labels there, else by the whole picture."""
+        whites = dict.fromkeys(_faces(leg), codes.white)
+        seen = ((self._face(place.location), place.white) for place in codes.places)
+        return whites | {face: white for face, white in seen if face in whites and white is not None}
+
     def _face(self, code: str) -> Face:
         place = self._site.locations[code]
         return place.aisle, place.side, place.level
@@ -394,7 +400,7 @@ class Scanner:
             if leg is None:
                 return
             taken = codes.exposure, codes.gain
-            self._light.take(_faces(leg), self._shot, taken, codes.white, leg.exposure)
+            self._light.take(self._whites(leg, codes), self._shot, taken, leg.exposure)
             look = self._assigner.look(codes, pose, (leg.aisle, leg.side))
             agreeing = self._proven(look, f"aisle {leg.aisle}")
             if agreeing is not None:

@@ -45,10 +45,10 @@ def read_shelf(
     started = cv2.getTickCount()
     reads = _shifted(read_codes(_cut(bgr, box)), box, bgr)
     read = cv2.getTickCount()
-    white = white_level(bgr)
+    usual, whites = white_level(bgr), _whites(bgr, places, reads)
     looks, kept = [], {}
     for place in places:
-        look, jpeg = _look(bgr, place, reads, white)
+        look, jpeg = _look(bgr, place, reads, whites.get(place.level), usual)
         looks.append(look)
         if jpeg:
             kept[look.evidence] = jpeg
@@ -97,9 +97,28 @@ def _shifted(reads: Sequence[CodeRead], box: Box, picture: Image) -> tuple[CodeR
     )
 
 
-def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> tuple[PlaceLook, bytes]:
-    """What one place shows, and its picture."""
+def _whites(bgr: Image, places: Sequence[Place], reads: Sequence[CodeRead]) -> dict[int, float]:
+    """The grey level of paper on each level that the picture shows labels on: how one is lit says nothing of
+    the next."""
     height, width = bgr.shape[:2]
+    labels: dict[int, list[Image]] = {}
+    for place in places:
+        here = (_box(read.corners_px, width, height, _MARGIN) for read in reads if _contains(_lit(place), read))
+        labels.setdefault(place.level, []).extend(label for box in here if (label := _cut(bgr, box)).size)
+    return {level: paper_level(bgr, seen) for level, seen in labels.items() if seen}
+
+
+def _lit(place: Place) -> Quad:
+    return place.lit_px or place.quad_px
+
+
+def _look(
+    bgr: Image, place: Place, reads: Sequence[CodeRead], paper: float | None, usual: float
+) -> tuple[PlaceLook, bytes]:
+    """What one place shows, and its picture.  `paper` is the grey level of labels on its level, None where
+    there are none: then the `usual` one of white counts, that of the whole picture."""
+    height, width = bgr.shape[:2]
+    white = usual if paper is None else paper
     occupancy = Occupancy.UNSURE
     # in its core: a code below may be the shelf's own label
     if any(_contains(place.core_px, read) for read in reads):
@@ -109,7 +128,8 @@ def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> 
         core = bgr[y0:y1, x0:x1]
         occupancy = judge(core, white, partial(deck.is_seen, bgr, place.deck_px, core, white))
     x0, y0, x1, y1 = _box(place.quad_px, width, height)
-    light = light_on(bgr[y0:y1, x0:x1], white)
+    lit = _box(_lit(place), width, height)
+    light = light_on(bgr[lit[1] : lit[3], lit[0] : lit[2]], white)
     opening = _opening(bgr, place, reads, white)
     fill = None if opening is None else opening.fill
     if occupancy is Occupancy.EMPTY:
@@ -121,7 +141,14 @@ def _look(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) -> 
         fill = PlaceFill(None)
     has_code = any(read.text != place.location and _contains(place.quad_px, read) for read in reads)
     look = PlaceLook(
-        place.location, place.quad_px, place.share, occupancy, light=light, fill=fill, code=has_code
+        place.location,
+        place.quad_px,
+        place.share,
+        occupancy,
+        light=light,
+        fill=fill,
+        code=has_code,
+        white=None if paper is None else round(paper, 1),
     )
     if not (look.worth > place.kept and x1 > x0 and y1 > y0):
         return look, b""

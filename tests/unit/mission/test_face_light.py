@@ -44,7 +44,7 @@ def fly(light: FaceLight, camera: Camera, count: int, leg: LegLight = LEG) -> tu
         shot = light.shot([LEFT], leg, flown_mps)
         taken, white = camera.take(shot)
         assert taken[0] * flown_mps <= leg.sharp_mps * 1.001 or not light.follows, "blurred"
-        light.take([LEFT], shot, taken, white, leg.exposure)
+        light.take({LEFT: white}, shot, taken, leg.exposure)
         flown_mps += min(max(shot.speed_mps - flown_mps, -0.1), 0.1)
         shots.append(shot)
         whites.append(white)
@@ -80,7 +80,7 @@ def test_what_was_set_right_is_not_touched_until_it_is_really_wrong_again() -> N
 def test_one_picture_of_a_lamp_changes_nothing() -> None:
     light = chooser()
     for white in (200.0, 200.0, 255.0, 200.0, 200.0, 12.0, 200.0):
-        light.take([LEFT], Shot(), (1.0, 1.0), white, 1.0)
+        light.take({LEFT: white}, Shot(), (1.0, 1.0), 1.0)
     assert light.part([LEFT]) == 1.0
 
 
@@ -95,7 +95,7 @@ def test_no_exposure_is_longer_than_blur_allows_and_no_light_beyond_its_bounds(
         assert 1.0 <= shot.gain <= MOST_GAIN
         assert LEG.speed_mps / 2 <= shot.speed_mps <= LEG.speed_mps
         before = light.part([LEFT])
-        light.take([LEFT], shot, (shot.exposure, shot.gain), white, LEG.exposure)
+        light.take({LEFT: white}, shot, (shot.exposure, shot.gain), LEG.exposure)
         assert LEAST <= light.part([LEFT]) <= MOST
         assert 1.0 / 1.601 <= light.part([LEFT]) / before <= 1.601
 
@@ -134,5 +134,5 @@ def test_each_front_has_its_own_light_and_keeps_it_for_the_next_look() -> None:
 def test_without_a_white_nothing_is_learnt() -> None:
     light = chooser()
     for _ in range(9):
-        light.take([LEFT], Shot(), (1.0, 1.0), None, 1.0)
+        light.take({LEFT: None}, Shot(), (1.0, 1.0), 1.0)
     assert light.shot([LEFT], LEG, 0.8) == Shot(1.0, 1.0, 0.8)
