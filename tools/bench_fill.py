@@ -129,7 +129,7 @@ class PassingVotes:
 @dataclass(frozen=True, slots=True)
 class Looks:
     """How places are looked at: at `nodes` of a site, by so many `pictures` of a view, `aside_m` apart; so
-    large a part of the places is `empty`; `uneven`: the light differs by level, as it does in the rough world."""
+    large a part of the places is `empty`; `uneven`: the light differs by level, as in the rough world."""
 
     nodes: int = 2
     pictures: int = 3

@@ -352,9 +352,11 @@ class Scanner:
 
     def _whites(self, leg: SweepLeg, codes: CodeSet) -> dict[Face, float | None]:
         """What white paper came out as, by front: by the labels there, else by the whole picture."""
-        whites = dict.fromkeys(_faces(leg), codes.white)
-        seen = ((self._face(place.location), place.white) for place in codes.places)
-        return whites | {face: white for face, white in seen if face in whites and white is not None}
+        whites: dict[Face, float | None] = dict.fromkeys(_faces(leg), codes.white)
+        for place in codes.places:
+            if place.white is not None and (face := self._face(place.location)) in whites:
+                whites[face] = place.white
+        return whites
 
     def _face(self, code: str) -> Face:
         place = self._site.locations[code]

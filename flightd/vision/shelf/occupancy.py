@@ -12,7 +12,7 @@ case is `UNSURE`: an empty place is never guessed.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -55,20 +55,16 @@ class CoreMeasures:
 
 def white_level(picture: Image) -> float:
     """The grey level of white paper in a picture, (H, W, 3) BGR; NaN where nothing is so light."""
-    white = _lightest(picture)
+    white = lightest(picture)
     return white if white >= _LEAST_WHITE else float("nan")
 
 
-def paper_level(picture: Image, codes: Sequence[Image]) -> float:
-    """The grey level of white paper in a picture, (H, W, 3) BGR: that of the labels, where these show their
-    `codes`, else of the lightest that there is."""
-    labels = [float(np.percentile(cv2.cvtColor(code, cv2.COLOR_BGR2GRAY), _LABEL_SHARE)) for code in codes]
-    if labels:
-        return float(np.median(labels))
-    return _lightest(picture)
+def paper_level(code: Image) -> float:
+    """The grey level of the paper on which a code, (H, W, 3) BGR, is printed."""
+    return float(np.percentile(cv2.cvtColor(code, cv2.COLOR_BGR2GRAY), _LABEL_SHARE))
 
 
-def _lightest(picture: Image) -> float:
+def lightest(picture: Image) -> float:
     """The grey level that hardly anything in a picture, (H, W, 3) BGR, is above."""
     grey = cv2.cvtColor(np.ascontiguousarray(picture[::4, ::4]), cv2.COLOR_BGR2GRAY)
     up_to = np.cumsum(cv2.calcHist([grey], [0], None, [256], [0, 256]).ravel())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from statistics import median
 from typing import TypeAlias
 
 import cv2
@@ -17,7 +18,7 @@ from flightd.vision.shelf import empty_deck as deck
 from flightd.vision.shelf.code_reader import read_codes
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg, picture_name
 from flightd.vision.shelf.fill_level import OpeningLook, fill_level
-from flightd.vision.shelf.occupancy import judge, light_on, paper_level, white_level
+from flightd.vision.shelf.occupancy import judge, light_on, lightest, paper_level, white_level
 from flightd.vision.shelf.opening_raster import onto_opening
 
 Box: TypeAlias = tuple[int, int, int, int]
@@ -45,7 +46,8 @@ def read_shelf(
     started = cv2.getTickCount()
     reads = _shifted(read_codes(_cut(bgr, box)), box, bgr)
     read = cv2.getTickCount()
-    usual, whites = white_level(bgr), _whites(bgr, places, reads)
+    papers = _papers(bgr, reads)
+    usual, whites = white_level(bgr), _whites(places, papers)
     looks, kept = [], {}
     for place in places:
         look, jpeg = _look(bgr, place, reads, whites.get(place.level), usual)
@@ -54,9 +56,8 @@ def read_shelf(
             kept[look.evidence] = jpeg
     per_ms = cv2.getTickFrequency() * 1e-3
     timings = {"codes": (read - started) / per_ms, "places": (cv2.getTickCount() - read) / per_ms}
-    labels = [_cut(bgr, _box(read.corners_px, width, height)) for read in reads]
-    paper = paper_level(_cut(bgr, box), [label for label in labels if label.size])
-    how = timings, exposure, gain, round(paper, 1)
+    white = median(level for _, level in papers) if papers else lightest(_cut(bgr, box))
+    how = timings, exposure, gain, round(white, 1)
     return CodeSet(seq, stamp_ns, width, height, reads, tuple(looks), *how), kept
 
 
@@ -97,15 +98,21 @@ def _shifted(reads: Sequence[CodeRead], box: Box, picture: Image) -> tuple[CodeR
     )
 
 
-def _whites(bgr: Image, places: Sequence[Place], reads: Sequence[CodeRead]) -> dict[int, float]:
-    """The grey level of paper on each level that the picture shows labels on: how one is lit says nothing of
-    the next."""
+def _papers(bgr: Image, reads: Sequence[CodeRead]) -> list[tuple[CodeRead, float]]:
+    """The codes with the grey level of their labels' paper."""
     height, width = bgr.shape[:2]
-    labels: dict[int, list[Image]] = {}
+    labels = ((read, _cut(bgr, _box(read.corners_px, width, height, _MARGIN))) for read in reads)
+    return [(read, paper_level(label)) for read, label in labels if label.size]
+
+
+def _whites(places: Sequence[Place], papers: Sequence[tuple[CodeRead, float]]) -> dict[int, float]:
+    """The grey level of white paper on each level on which there are labels: how one is lit says nothing of
+    the next."""
+    found: dict[int, list[float]] = {}
     for place in places:
-        here = (_box(read.corners_px, width, height, _MARGIN) for read in reads if _contains(_lit(place), read))
-        labels.setdefault(place.level, []).extend(label for box in here if (label := _cut(bgr, box)).size)
-    return {level: paper_level(bgr, seen) for level, seen in labels.items() if seen}
+        here = [level for read, level in papers if _contains(_lit(place), read)]
+        found.setdefault(place.level, []).extend(here)
+    return {level: median(here) for level, here in found.items() if here}
 
 
 def _lit(place: Place) -> Quad:

@@ -25,7 +25,8 @@ from flightd.vision.shelf.shelf_look import read_shelf
 
 SITE = load_site(shipped("site-racks-small.toml"))
 NODES = [node.id for node in SITE.aisle_nodes("A")][:3]
-SEED = 4
+SEED, EMPTY_SEED = 4, 6
+"""Of the goods; with the second there is an empty place on each level."""
 BEFORE_M = 2.0
 """A leg is reached with the shelf in view already, as on the turn before it."""
 
@@ -39,8 +40,11 @@ def one_thread() -> Iterator[None]:
 
 
 @cache
-def flown_past(lit: float, *, learns: bool, lamp: float = 0.0) -> tuple[dict[str, Finding], int]:
-    """What is found on the left of aisle A in that light, by that lamp, and how many places there are."""
+def flown_past(
+    *lit: float, learns: bool, lamp: float = 0.0, level: int = 1, seed: int = SEED
+) -> tuple[dict[str, Finding], int]:
+    """What is found on the left of aisle A, from that level on, in that light, of which there may be one for
+    each level, by that lamp, and how many places there are."""
     expert = {} if learns else {"darker": 1.0, "brighter": 1.0}
     config = load_config(shipped("sim.toml")).with_values(
         front_camera={"url": "udp://127.0.0.1:0"}, scan={"mode": "sweep", "expert": expert}
@@ -48,9 +52,10 @@ def flown_past(lit: float, *, learns: bool, lamp: float = 0.0) -> tuple[dict[str
     scanner = scanner_of(config, SITE)
     assert isinstance(scanner, Scanner)
     legs = scanner.legs(NODES, NODES[0], -math.pi / 2, 0.9)
-    leg = next(leg for leg in legs if leg.side.value == "left")
+    leg = next(leg for leg in legs if leg.side.value == "left" and leg.levels[0] == level)
     camera = FrontCamera()
-    renderer = FrontRenderer(SITE, camera, RackAppearance(light={"A left": lit}), SEED)
+    light = {f"A left {number}": factor for number, factor in enumerate(lit, start=1)} | {"A left": lit[0]}
+    renderer = FrontRenderer(SITE, camera, RackAppearance(light=light), seed)
     scanner.begin_sweep([leg])
     scanner.begin_leg(0)
     scanner.step_sweep(0, leg, 0.0)
@@ -92,6 +97,17 @@ def test_a_dark_or_over_lit_front_is_counted_as_well_but_for_where_its_light_was
     left_alone, count = flown_past(lit, learns=False)
     found, _ = flown_past(lit, learns=True)
     assert len(left_alone) <= count / 2
+    assert len(found) >= count - 1
+    assert states(found).items() <= right.items()
+
+
+@pytest.mark.parametrize(("level", "lit"), [(1, (0.5, 2.0)), (2, (2.0, 0.5))])
+def test_a_level_is_counted_in_its_own_light_whatever_its_neighbours_is(
+    level: int, lit: tuple[float, float]
+) -> None:
+    right = states(flown_past(1.0, learns=False, level=level, seed=EMPTY_SEED)[0])
+    found, count = flown_past(*lit, learns=True, level=level, seed=EMPTY_SEED)
+    assert LocationState.EMPTY in right.values()
     assert len(found) >= count - 1
     assert states(found).items() <= right.items()
 
