@@ -91,7 +91,8 @@ class PlaceLook:
     """What one picture shows of one location; `evidence` names the picture of it (SHA-256), empty
     where none was made.
     `fill` is None where it shows too little of the opening; `code` says whether a code is there that is not
-    the location's own label; `white` is as in `CodeSet`, by the labels on the location's level alone, None
+    the location's own label; `deck` says whether it would show its deck if it were empty: where not, it
+    cannot tell that it is; `white` is as in `CodeSet`, by the labels on the location's level alone, None
     where the picture shows none."""
 
     location: str
@@ -102,6 +103,7 @@ class PlaceLook:
     light: Light = Light.FAIR
     fill: PlaceFill | None = None
     code: bool = False
+    deck: bool = True
     white: float | None = None
 
     @property

@@ -43,6 +43,8 @@ class LocationVotes:
         self._fills = FillVotes()
         self._seen: Counter[Occupancy] = Counter()
         self._empty_in_a_row = self._most_empty = 0
+        self._blind = 0
+        """Looks that say nothing, nor could they say that it is empty."""
         self._quiet = 0
         self._largest = 0.0
         self.kept = NO_PICTURE
@@ -97,7 +99,12 @@ class LocationVotes:
             visible = place.light is Light.FAIR or place.occupancy is Occupancy.EMPTY
             occupancy = place.occupancy if visible else Occupancy.UNSURE
             self._seen[occupancy] += 1
-            self._empty_in_a_row = self._empty_in_a_row + 1 if occupancy is Occupancy.EMPTY else 0
+            if occupancy is Occupancy.EMPTY:
+                self._empty_in_a_row += 1
+            elif occupancy is not Occupancy.UNSURE or place.deck:
+                self._empty_in_a_row = 0
+            else:
+                self._blind += 1
             self._most_empty = max(self._most_empty, self._empty_in_a_row)
         self._fills.add(place.fill if place is not None else None)
         if place is not None or reads:
@@ -129,10 +136,11 @@ class LocationVotes:
         return replace(self._found(state, _NO_CODE, self._pose), undecided=self._undecided((), others))
 
     def _is_empty(self, final: bool) -> bool:
-        """Whether looks in a row show an empty place, and none ever showed that there is something."""
+        """Whether looks in a row, of those that can, show an empty place, and none ever showed that there is
+        something."""
         enough = self._enough and self._empty_in_a_row >= self._least
         if final:
-            all_empty = self._empty_in_a_row == self.looks >= _LEAST_EMPTY
+            all_empty = self._empty_in_a_row == self.looks - self._blind >= _LEAST_EMPTY
             enough = enough or all_empty or self._most_empty >= self._least
         shown = self.any_goods or any(self._seen[kind] for kind in _OCCUPIED)
         return enough and not shown and not any(passed.read.believed for passed, _ in self._passed)

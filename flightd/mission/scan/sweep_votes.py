@@ -55,6 +55,7 @@ class SweepVotes:
         self._texts: set[str] = set()
         self._fair_rad: list[float] = []
         self._whole_rad: list[float] = []
+        self._telling_rad: list[float] = []
         self._unfair = self._occupied = self._empty = 0
         self._whole_occupied = self._whole_empty = 0
         self._doubtful: set[str] = set()
@@ -87,7 +88,9 @@ class SweepVotes:
                     self._whole_empty += place.occupancy is Occupancy.EMPTY
                 if fair:
                     self._fair_rad.append(bearing_rad)
-                    self._whole_rad += [bearing_rad] * (share >= _WHOLE_SHARE)
+                    whole = [bearing_rad] * (share >= _WHOLE_SHARE)
+                    self._whole_rad += whole
+                    self._telling_rad += whole * place.deck
         if reads:
             self.newest_ns = max(self.newest_ns, pose.stamp_ns)
         self._doubtful.update(doubtful)
@@ -157,8 +160,8 @@ class SweepVotes:
             return Undecided.UNSURE
         spread_rad = math.radians(sweep.unread_spread_deg)
         if self._occupied < _LEAST_WHOLE:  # an empty place would have shown its deck to one of so many views
-            enough = len(self._whole_rad) >= sweep.unread_views and not self._empty
-            return found if enough and _spread(self._whole_rad) >= 2.0 * spread_rad else Undecided.UNSURE
+            enough = len(self._telling_rad) >= sweep.unread_views and not self._empty
+            return found if enough and _spread(self._telling_rad) >= 2.0 * spread_rad else Undecided.UNSURE
         enough = len(self._whole_rad) >= _LEAST_WHOLE and _spread(self._fair_rad) >= spread_rad
         return found if enough else Undecided.UNSEEN
 

@@ -40,6 +40,15 @@ _STEP = 0.06
 """Part of white by which the colours of a strip's rows next but one to each other may differ."""
 
 
+def would_show(deck: Quad, core_px: float) -> bool:
+    """Whether the deck of an empty place can be told: the part of it in `deck`, as in `Place`, is seen from
+    well enough above, beside the core, which is so high in the picture."""
+    if not deck:
+        return False
+    far, near = (deck[0][1] + deck[1][1]) / 2, (deck[2][1] + deck[3][1]) / 2
+    return near - far >= max(_LEAST_PX, _FOOT_PART * core_px)
+
+
 def is_seen(picture: Image, deck: Quad, core: Image, white: float) -> bool:
     """Whether a picture, (H, W, 3) BGR of that white level, shows the deck of a place from its front to deep
     behind it.  `deck` is where that part of the deck is expected, `core` the core of the place's cell."""

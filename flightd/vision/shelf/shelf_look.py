@@ -139,6 +139,7 @@ def _look(
     light = light_on(bgr[lit[1] : lit[3], lit[0] : lit[2]], white)
     opening = _opening(bgr, place, reads, white)
     fill = None if opening is None else opening.fill
+    shows_deck = occupancy is Occupancy.EMPTY or _would_show_deck(place, width, height)
     if occupancy is Occupancy.EMPTY:
         if opening is not None and opening.is_clear:
             fill = PlaceFill(0.0)
@@ -155,6 +156,7 @@ def _look(
         light=light,
         fill=fill,
         code=has_code,
+        deck=shows_deck,
         white=None if paper is None else round(paper, 1),
     )
     if not (look.worth > place.kept and x1 > x0 and y1 > y0):
@@ -175,6 +177,12 @@ def _opening(bgr: Image, place: Place, reads: Sequence[CodeRead], white: float) 
         if x0 >= 0.0 and x1 <= opening.width_m and low >= 0.0 and high <= opening.height_m:
             codes.append((float(x0), float(low), float(x1), float(high)))
     return fill_level(bgr, opening, white, codes)
+
+
+def _would_show_deck(place: Place, width: int, height: int) -> bool:
+    inside = _is_inside(place.core_px, width, height) and _is_inside(place.deck_px[2:], width, height)
+    rows = [y for _, y in place.core_px]
+    return inside and deck.would_show(place.deck_px, max(rows) - min(rows))
 
 
 def _is_inside(quad: Quad, width: int, height: int) -> bool:

@@ -296,6 +296,25 @@ def test_what_looked_empty_to_some_views_is_not_said_to_be_unreadable() -> None:
         assert state(verdict(NOTHING_AT_ALL, seen)) is Undecided.UNSURE
 
 
+def test_from_where_no_deck_would_show_nothing_is_said_to_be_empty_or_unreadable_for_want_of_one() -> None:
+    def seen(*views: tuple[Occupancy, bool]) -> tuple[LocationState | Undecided, LocationState | None]:
+        votes, stop = SweepVotes(CODE, "A2", PARAMS, 1.0), LocationVotes(CODE, "A2", PARAMS.pictures)
+        for seq, (occupancy, deck) in enumerate(views):
+            look = PlaceLook(CODE, QUAD, 1.0, occupancy, f"picture {seq}", deck=deck)
+            votes.add(seq, pose(seq * 250_000_000), look, (), bearing_rad=math.radians(8.0 * seq))
+            stop.add(seq, pose(seq * 250_000_000), look, ())
+        told = stop.finding(final=True)
+        return state(votes.verdict()), told and told.state
+
+    low, hidden, empty = (UNSURE, False), (UNSURE, True), (EMPTY, True)
+    assert seen(*[hidden] * 8)[0] is LocationState.UNREADABLE
+    assert seen(*[low] * 8)[0] is Undecided.UNSURE
+    assert seen(empty, low, empty, low, low, empty) == (LocationState.EMPTY, LocationState.EMPTY)
+    assert seen(low, empty, low, empty)[1] is LocationState.EMPTY
+    assert seen(empty, hidden, empty, low, hidden, empty)[1] is LocationState.UNREADABLE
+    assert seen(low, (GOODS, False), empty, empty, empty)[1] is LocationState.UNREADABLE
+
+
 def test_a_code_that_may_be_a_neighbours_leaves_no_place_without_a_code() -> None:
     assert verdict(NOTHING, doubtful=["P1"]) is Undecided.NOBODYS
     assert state(verdict(NOTHING, doubtful=["P1"], others=["P1"])) is LocationState.UNREADABLE
