@@ -304,7 +304,7 @@ def test_from_where_no_deck_would_show_nothing_is_said_to_be_empty_or_unreadable
             votes.add(seq, pose(seq * 250_000_000), look, (), bearing_rad=math.radians(8.0 * seq))
             stop.add(seq, pose(seq * 250_000_000), look, ())
         told = stop.finding(final=True)
-        return state(votes.verdict()), told and told.state
+        return state(votes.verdict()), None if told is None else told.state
 
     low, hidden, empty = (UNSURE, False), (UNSURE, True), (EMPTY, True)
     assert seen(*[hidden] * 8)[0] is LocationState.UNREADABLE
