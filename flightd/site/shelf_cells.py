@@ -19,7 +19,7 @@ _DECK_BELOW = 0.4
 _LEAST_SPACING_M = 0.4
 """Goods stand this part of the level spacing (no less than that) below their labels, where the site does not
 say it."""
-_DECK_SEEN_M = 0.3
+_DECK_SEEN_M = 0.34
 """How deep the deck of an empty place is looked at."""
 _BEAM_M, _MOST_BEAM = 0.10, 0.5
 """Height of the beam below a deck, and the most of the way from deck to deck that it takes."""
