@@ -7,7 +7,8 @@ from types import TracebackType
 
 
 class Within:
-    """`async with Within(seconds):` as `asyncio.timeout`: TimeoutError where the body takes longer.
+    """`async with Within(seconds):` as `asyncio.timeout`: TimeoutError where the body takes longer; with no
+    time left (0, or less) at its first wait.
 
     Also in a task that was cancelled before and is cleaning up: before Python 3.11.3, which Debian 12 and
     Raspberry Pi OS do not have, `asyncio.timeout` ends such a task by CancelledError instead, and what came
@@ -22,7 +23,13 @@ class Within:
         if task is None:
             raise RuntimeError("there is no task to end")
         self._task, self._cancelled_before = task, task.cancelling()
-        self._expiry = asyncio.get_running_loop().call_later(max(self._seconds, 0.0), self._expire)
+        loop = asyncio.get_running_loop()
+        # where no time is left, before what is ready at once: a timer would come after it
+        self._expiry = (
+            loop.call_later(self._seconds, self._expire)
+            if self._seconds > 0.0
+            else loop.call_soon(self._expire)
+        )
 
     def _expire(self) -> None:
         self._expired = True
