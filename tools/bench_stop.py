@@ -30,6 +30,7 @@ from flightd.core.tick import TickInput
 from flightd.core.types import Attitude, AttitudeSetpoint, CommandKind, Demand, Event, Phase, VehicleState
 from flightd.pilot import Pilot
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.within import Within
 from flightd.site.site_file import load_site
 from tests.sim.ideal.ideal_flight import IdealFlight
 
@@ -140,7 +141,7 @@ async def _measure(stops: int) -> dict[str, Any]:
                 await asyncio.sleep(WARM_S + TICK_S * random.random())
                 asked_s = loop.time()
                 await client.order(CommandKind.STOP, order_id=os.urandom(8).hex())
-                async with asyncio.timeout(5.0):
+                async with Within(5.0):
                     taken_ms.append((await listener.stopped - asked_s) * 1e3)
                 ticking.cancel()
             for service in services:

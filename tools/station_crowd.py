@@ -22,6 +22,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 from websockets.typing import Origin
 
+from flightd.runtime.within import Within
 from tools.slow_line import SlowLine
 from tools.system_browser import system_browser
 
@@ -180,7 +181,7 @@ class StalledPage:
         hung.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         hung.setblocking(False)
         loop = asyncio.get_running_loop()
-        async with asyncio.timeout(ANSWER_S):
+        async with Within(ANSWER_S):
             await loop.sock_connect(hung, self._at)
             await loop.sock_sendall(hung, "\r\n".join(lines).encode())
             await loop.sock_recv(hung, 32)
@@ -251,7 +252,7 @@ class Crowd:
         self.reloads = 0
 
     async def do(self, order: dict[str, Any]) -> dict[str, Any]:
-        async with asyncio.timeout(2 * ANSWER_S):
+        async with Within(2 * ANSWER_S):
             match order.pop("do"):
                 case "open":
                     await self._close()
@@ -313,7 +314,7 @@ class Crowd:
         from playwright.async_api import Error  # noqa: PLC0415 - only where it is wanted
 
         try:
-            async with self._loading, asyncio.timeout(ANSWER_S):
+            async with self._loading, Within(ANSWER_S):
                 await chromium.close()
                 await chromium.open()
             self.reloads += 1

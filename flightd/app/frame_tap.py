@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 from collections.abc import Callable
 
 from flightd.doctor.camera import brightness_series
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.runtime.latest_slot import Latest
+from flightd.runtime.within import Within
 from flightd.vision.floor.brightness import Brightness
 
 
@@ -31,7 +31,7 @@ class FrameTap:
         found: list[Brightness] = []
         try:
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(seconds):
+                async with Within(seconds):
                     async for one in brightness_series(self._looking):
                         found.append(one)  # noqa: PERF401 - what came until the time is over is kept
         finally:

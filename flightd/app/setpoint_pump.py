@@ -9,6 +9,7 @@ from collections.abc import Callable
 from flightd.core.types import AttitudeSetpoint
 from flightd.ports import Clock, Vehicle
 from flightd.runtime.bounded_series import Series
+from flightd.runtime.within import Within
 
 _FAILS_S = 0.3
 """An adapter that fails at each setpoint for so long is given up."""
@@ -63,7 +64,7 @@ class SetpointPump:
             fresh = True
             try:
                 # a little more than the period, so that a steady maker of setpoints sets the pace
-                async with asyncio.timeout(self._period_s * 1.2):
+                async with Within(self._period_s * 1.2):
                     await self._fresh.wait()
             except TimeoutError:
                 fresh = False

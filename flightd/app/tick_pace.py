@@ -8,6 +8,7 @@ from typing import Any
 
 from flightd.core.tick import CLOSEST_TICKS_S, TICK_S
 from flightd.ports import Clock
+from flightd.runtime.within import Within
 
 _TICK_NS, _CLOSEST_NS = round(TICK_S * 1e9), round(CLOSEST_TICKS_S * 1e9)
 
@@ -26,7 +27,7 @@ class TickPace:
         before its period is over."""
         clock = self._clock
         try:
-            async with asyncio.timeout((self._due_ns - clock.now_ns()) * 1e-9):
+            async with Within((self._due_ns - clock.now_ns()) * 1e-9):
                 await self._arrival()
                 await asyncio.sleep((self._last_ns + _CLOSEST_NS - clock.now_ns()) * 1e-9)
         except TimeoutError:

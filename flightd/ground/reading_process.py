@@ -14,6 +14,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
 from flightd.ground.bounded import Room
 from flightd.runtime.child_process import Child
+from flightd.runtime.within import Within
 
 MOST_WAITING = 32
 """More requests than this are refused, unless less is said."""
@@ -74,7 +75,7 @@ class ReadingProcess:
 
     async def _answer(self, job: _Job, within_s: float) -> object:
         try:
-            async with asyncio.timeout(_START_S):
+            async with Within(_START_S):
                 child = await self._started()
         except TimeoutError:
             self.close()
@@ -83,7 +84,7 @@ class ReadingProcess:
             self._child = None
             raise NotStartedError(f"the reading process does not start: {err.strerror or err}") from None
         try:
-            async with asyncio.timeout(within_s):
+            async with Within(within_s):
                 return await child.ask(job)
         except TimeoutError:
             self.close()

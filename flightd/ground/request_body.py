@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
-
 from starlette.requests import ClientDisconnect, Request
 
 from flightd.core.errors import InputError
+from flightd.runtime.within import Within
 
 _UPLOAD_S = 60.0
 
@@ -19,7 +18,7 @@ async def whole_body(request: Request, most_bytes: int, what: str = "file") -> b
     try:
         if size <= most_bytes:
             size = 0
-            async with asyncio.timeout(_UPLOAD_S):
+            async with Within(_UPLOAD_S):
                 async for part in request.stream():
                     parts.append(part)
                     size += len(part)

@@ -11,6 +11,7 @@ from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.core.types import AttitudeSetpoint, Demand, VehicleState
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.within import Within
 from flightd.sim.ardrone.at_commands import DroneCommand, parse
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer, DronePorts
@@ -133,5 +134,5 @@ async def ended(task: asyncio.Task[None]) -> None:
 
 
 async def settled(awaitable: Awaitable[T], limit_s: float = 10.0) -> T:
-    async with asyncio.timeout(limit_s):
+    async with Within(limit_s):
         return await awaitable

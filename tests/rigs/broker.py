@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from flightd.runtime.free_ports import free_port
+from flightd.runtime.within import Within
 
 _PROGRAM = shutil.which("mosquitto", path=os.environ.get("PATH", "") + os.pathsep + "/usr/sbin")
 _BEGINS_S = 20.0
@@ -46,7 +47,7 @@ class Mosquitto:
 
     async def listens(self) -> None:
         """Wait until whoever connects is taken."""
-        async with asyncio.timeout(_BEGINS_S):
+        async with Within(_BEGINS_S):
             while True:
                 with contextlib.suppress(OSError):
                     _, writer = await asyncio.open_connection("127.0.0.1", self.port)

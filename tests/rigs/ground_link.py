@@ -28,6 +28,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.within import Within
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
 from tests.rigs.possible_commands import possible_in
@@ -100,7 +101,7 @@ async def telling(link: ZmqGround, phase: Phase = Phase.FOLLOW) -> AsyncIterator
 
 async def connected(client: GroundClient, link: ZmqGround) -> None:
     """Until what is published reaches the client (a subscription takes its time)."""
-    async with asyncio.timeout(20), telling(link):
+    async with Within(20), telling(link):
         async for _ in client.published():
             return
 

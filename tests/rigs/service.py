@@ -30,6 +30,7 @@ from flightd.core.topics import Topic
 from flightd.replay.log import read_log
 from flightd.runtime.free_ports import free_ports
 from flightd.runtime.message_channel import Channel
+from flightd.runtime.within import Within
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.sim.world import WorldSpec
@@ -160,7 +161,7 @@ class ServiceRig:
 
     async def until(self, condition: Callable[[StatusReport], bool], within_s: float = 60.0) -> StatusReport:
         """The first status of which `condition` holds."""
-        async with asyncio.timeout(within_s):
+        async with Within(within_s):
             async for status in self.statuses():
                 if condition(status):
                     return status

@@ -24,6 +24,7 @@ from flightd.ground.hub import Viewer
 from flightd.ground.mqtt.fleet_link import FleetLink
 from flightd.ground.schedules.night_shift import THIS_MACHINE, StationClock
 from flightd.ground.server import Listening, opened, serve
+from flightd.runtime.within import Within
 
 JSON = {"Content-Type": "application/json"}
 
@@ -89,7 +90,7 @@ class Station:
         try:
             writer.write(data)
             with contextlib.suppress(TimeoutError, ConnectionError):
-                async with asyncio.timeout(within_s):
+                async with Within(within_s):
                     while part := await reader.read(65536):
                         heard += part
         finally:
@@ -147,7 +148,7 @@ async def served(
 
 async def told(socket: ClientConnection, topic: str, drone: str = "demo", within_s: float = 20.0) -> Any:
     """The next value of a topic that a page is told."""
-    async with asyncio.timeout(within_s):
+    async with Within(within_s):
         while True:
             message = await socket.recv()
             if isinstance(message, str):
@@ -158,7 +159,7 @@ async def told(socket: ClientConnection, topic: str, drone: str = "demo", within
 
 async def pictured(socket: ClientConnection, within_s: float = 20.0) -> tuple[dict[str, Any], bytes]:
     """The next picture: its head and its JPEG."""
-    async with asyncio.timeout(within_s):
+    async with Within(within_s):
         while True:
             message = await socket.recv()
             if isinstance(message, bytes):
@@ -175,7 +176,7 @@ async def until_told(socket: ClientConnection, topic: str, field: str, value: An
 async def ending(page: ClientConnection) -> int | None:
     """The code with which the station closes a page."""
     try:
-        async with asyncio.timeout(10):
+        async with Within(10):
             while True:
                 await page.recv()
     except ConnectionClosed as ended:

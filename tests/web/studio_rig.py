@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from flightd.runtime.within import Within
 from tests.replay.synthetic_flight import write_flight
 from tests.web.served import JSON, Station
 
@@ -85,7 +86,7 @@ async def got(station: Station, path: str) -> Any:
 
 async def flight_of(station: Station, within_s: float = 60.0) -> tuple[str, int]:
     """The id of the folder's flight, and how many pictures it has."""
-    async with asyncio.timeout(within_s):
+    async with Within(within_s):
         while not (rows := (await got(station, "/api/flights"))["rows"]):  # noqa: ASYNC110 - it tells nobody
             await asyncio.sleep(0.1)
     flight = str(rows[0]["id"])
@@ -126,7 +127,7 @@ async def trained(station: Station, name: str, flights: list[str], within_s: flo
     """The set once it was trained."""
     code, said = await post(station, f"/api/studio/sets/{name}/train", {"flights": flights})
     assert code == 202, said
-    async with asyncio.timeout(within_s):
+    async with Within(within_s):
         while True:
             known = await got(station, f"/api/studio/sets/{name}")
             if not (known["training"] or {}).get("running"):

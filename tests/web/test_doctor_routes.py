@@ -20,6 +20,7 @@ from flightd.core.types import Phase
 from flightd.ground.access.roles import Role
 from flightd.ground.doctor.known_settings import KnownSettings
 from flightd.ground.studio.profile_shelf import ProfileShelf
+from flightd.runtime.within import Within
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import address_of, local, serving, telling
 from tests.rigs.waiting import until
@@ -150,7 +151,7 @@ async def test_lines_of_the_audit_that_the_disk_refuses_are_told(tmp_path: Path)
         async def lost() -> int:
             return int(json.loads((await station.ask("GET", "/api/doctor"))[1])["audit_lost"])
 
-        async with asyncio.timeout(20):
+        async with Within(20):
             while await lost() < 3:  # noqa: ASYNC110 - its thread tells nobody
                 await asyncio.sleep(0.02)
 

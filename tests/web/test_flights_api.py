@@ -22,6 +22,7 @@ from flightd.ground.flights.flight_index import FlightIndex
 from flightd.ground.flights.flight_view import read_view
 from flightd.ground.flights.flights import Flights
 from flightd.ground.reading_process import MOST_WAITING, ReadingProcess
+from flightd.runtime.within import Within
 from flightd.vision.jpeg import jpeg_size
 from tests.replay.synthetic_flight import write_flight
 from tests.rigs.event_loops import in_real_time
@@ -45,7 +46,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 async def listed(station: Station, most_s: float = 60.0) -> dict[str, dict[str, Any]]:
     """Every row by its path, once all were read."""
-    async with asyncio.timeout(most_s):
+    async with Within(most_s):
         while True:
             code, text = await station.ask("GET", "/api/flights")
             assert code == 200
@@ -158,7 +159,7 @@ async def test_a_flight_that_is_written_anew_is_told_apart_from_the_old_one(
         tag = next(line for line in head.splitlines() if line.lower().startswith("etag")).split(" ")[1]
         assert (await head_of(station, path, f"If-None-Match: {tag}")).startswith("HTTP/1.1 304")
         os.utime(log, (1e9, 1e9))
-        async with asyncio.timeout(60):
+        async with Within(60):
             while (await listed(station))["alone/flight.mcap"]["stamp"] == stamp:  # noqa: ASYNC110
                 await asyncio.sleep(0.2)
         assert (await asked(station, f"/api/flights/{row['id']}"))["stamp"] != stamp
@@ -293,7 +294,7 @@ async def test_a_report_that_lies_there_is_shown_unless_the_log_is_newer(
         assert "the one that lies there" in (await station.answer("GET", f"/api/flights/{flight}/report"))[1]
         later = time.time() + 60
         os.utime(log, (later, later))
-        async with asyncio.timeout(60):
+        async with Within(60):
             while (
                 "the one that lies there" in (await station.answer("GET", f"/api/flights/{flight}/report"))[1]
             ):
@@ -327,7 +328,7 @@ async def test_many_logs_do_not_hold_up_the_loop(folder: Path, tmp_path: Path) -
         await station.ask("GET", "/api/flights")
         held_s = []
         loop = asyncio.get_running_loop()
-        async with asyncio.timeout(240):
+        async with Within(240):
             while True:
                 began_s = loop.time()
                 await asyncio.sleep(0.01)

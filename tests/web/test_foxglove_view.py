@@ -39,6 +39,7 @@ from flightd.ground.foxglove_view.reach import foxglove_address
 from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.server import Listening
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.within import Within
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import address_of, local, serving, telling
@@ -120,7 +121,7 @@ async def test_a_foreign_viewer_of_a_stations_own_process_sees_it_all_live() -> 
 async def ended(socket: ClientConnection) -> bool:
     """Whether the server closes it in order."""
     try:
-        async with asyncio.timeout(30):
+        async with Within(30):
             while True:
                 await socket.recv()
     except ConnectionClosed as closed:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 
+from flightd.runtime.within import Within
 from tests.rigs.event_loops import in_real_time
 from tests.web.chromium import station
 from tests.web.malformed import Malformed, Station, b64, malformed, opening
@@ -83,7 +84,7 @@ def test_malformed_messages_are_refused_and_the_station_serves_on(url: str, tmp_
 async def answer_to(message: Malformed, known: Station) -> str:
     """`refused`, `taken`, or `escaped` where the station itself went wrong."""
     host, _, port = known.host.partition(":")
-    async with asyncio.timeout(_PATIENCE_S):
+    async with Within(_PATIENCE_S):
         reader, writer = await asyncio.open_connection(host, int(port))
         try:
             if message.over_socket:

@@ -18,6 +18,7 @@ from flightd.config.schema import load_config
 from flightd.core.errors import InputError, RunError
 from flightd.ground.access.roles import Role
 from flightd.ground.missions.mission_book import FILE, Mission, MissionBook
+from flightd.runtime.within import Within
 from flightd.site.site_file import load_site
 from tests.rigs.brisk import BRISK
 from tests.rigs.event_loops import in_real_time
@@ -179,7 +180,7 @@ async def test_a_viewer_looks_on_and_what_an_operator_changes_is_written_down(tm
 
 async def heard(station: Station, method: str, way: str, **body: Any) -> tuple[int, Any]:
     """What the drone answers; asked again while a slow machine lets it say nothing."""
-    async with asyncio.timeout(60):
+    async with Within(60):
         while (said := await ask(station, method, way, **body))[0] == 503:
             pass
     return said

@@ -15,6 +15,7 @@ from flightd.config.schema import load_config
 from flightd.ground.access.roles import Role
 from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.schedules.night_shift import StationClock
+from flightd.runtime.within import Within
 from flightd.site.site_file import load_site
 from tests.rigs.brisk import BRISK
 from tests.rigs.event_loops import in_real_time
@@ -88,7 +89,7 @@ class Viewer:
 
     async def until(self, seen: Callable[[dict[str, Any]], bool]) -> None:
         """Until it is told so."""
-        async with asyncio.timeout(60):
+        async with Within(60):
             while not seen(self.told):
                 self._told_more.clear()
                 await self._told_more.wait()
@@ -109,7 +110,7 @@ async def ask(
 
 async def run_is(station: Station, state: str, cause: str = "") -> dict[str, Any]:
     """The newest run of the schedule, once it is there."""
-    async with asyncio.timeout(60):
+    async with Within(60):
         while True:
             _, told = await ask(station, "GET", "/schedule-1/runs")
             newest: dict[str, Any] = told["runs"][0] if told["runs"] else {"state": "", "cause": ""}

@@ -23,6 +23,7 @@ from flightd.ground.guards import HEADERS
 from flightd.ground.hub import MOST_BROWSERS
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.free_ports import free_port
+from flightd.runtime.within import Within
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import Keyring, address_of, event, local, serving, tell_once, telling
 from tests.rigs.waiting import until
@@ -150,7 +151,7 @@ async def test_a_page_that_orders_more_than_a_person_can_is_closed() -> None:
 
 async def flood(page: ClientConnection, message: str) -> None:
     """Send it again and again, and read nothing."""
-    async with asyncio.timeout(20):
+    async with Within(20):
         while True:
             await page.send(message)
 
@@ -162,7 +163,7 @@ async def test_only_an_open_page_attends_and_closing_it_is_losing_the_ground() -
         assert silent_s(link) == 0.0, "it measures the way, and attends nothing"
         async with station.page() as page:
             await until(lambda: silent_s(link) > 0.0)
-            async with asyncio.timeout(20):
+            async with Within(20):
                 while not (await told(page, "link"))["attends"]:
                     pass
             async with station.page():
@@ -255,7 +256,7 @@ async def test_a_drone_that_nobody_flies_is_said_to_be_unheard_and_heard_when_it
         address = address_of(first)
     nowhere = Address("no.such.host.invalid")
     async with served(("demo", address), ("away", nowhere)) as station, station.page() as page:
-        async with asyncio.timeout(20):
+        async with Within(20):
             while "nobody listens" not in (await told(page, "link"))["trouble"]:
                 pass
             while "this name is not known here" not in (await told(page, "link", "away"))["trouble"]:
@@ -268,7 +269,7 @@ async def test_a_drone_that_nobody_flies_is_said_to_be_unheard_and_heard_when_it
             assert (await told(page, "welcome"))["floor"]["name"] == "demo"
             session = (await told(page, "status"))["session"]
         async with serving(local().model_copy(update=ports)) as link, telling(link, Phase.LAND):
-            async with asyncio.timeout(20):
+            async with Within(20):
                 while (status := await told(page, "status"))["session"] == session:
                     pass
             assert status["phase"] == "land"

@@ -27,6 +27,7 @@ from flightd.ground.expected_stock_book import MOST_UPLOADS, ExpectedStock, Expe
 from flightd.inventory.stock_columns import StockColumns
 from flightd.inventory.stock_table import MOST_BYTES
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.within import Within
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import SITE, address_of, local, serving
 from tests.rigs.waiting import until
@@ -304,7 +305,7 @@ async def test_more_comparisons_than_may_wait_are_refused_in_one_line(folder: Pa
         code, told = await posted(station, "/compare?store=monday", BOOKS)
         assert (code, told["refused"]) == (503, "too many comparisons wait already; try again in a moment")
         await asyncio.gather(*slow)
-        async with asyncio.timeout(20):
+        async with Within(20):
             while (await posted(station, "/compare?store=monday", BOOKS))[0] != 200:  # noqa: ASYNC110
                 await asyncio.sleep(0.1)
 

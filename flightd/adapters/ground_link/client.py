@@ -65,6 +65,7 @@ from flightd.adapters.ground_link.protocol import (
 from flightd.core.errors import InputError, RunError, TransientError, UnavailableError
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind
+from flightd.runtime.within import Within
 
 RETRY_S = 1.0
 """An answer that does not come for so long is asked for again, with the same id."""
@@ -315,7 +316,7 @@ class GroundClient:
         asked: asyncio.Future[tuple[Answer, list[bytes]]] = asyncio.get_running_loop().create_future()
         self._asked[asked] = request.id
         try:
-            async with asyncio.timeout(timeout_s):
+            async with Within(timeout_s):
                 return await self._repeated(request, asked)
         except TimeoutError:
             raise UnavailableError(await self._why_silent()) from None
@@ -330,7 +331,7 @@ class GroundClient:
         while True:
             await self._requests.send(encode(request))
             try:
-                async with asyncio.timeout(patience_s):
+                async with Within(patience_s):
                     return await asyncio.shield(asked)
             except TimeoutError:
                 await self._note_events()
@@ -379,7 +380,7 @@ class GroundClient:
         """The host's name stands for no address; not where nobody says so in time."""
         loop = asyncio.get_running_loop()
         try:
-            async with asyncio.timeout(_NAME_S):
+            async with Within(_NAME_S):
                 await loop.getaddrinfo(self._address.host, None)
         except socket.gaierror:
             return True

@@ -34,6 +34,7 @@ from flightd.config.edited_text import edited
 from flightd.config.reference import rows, tables
 from flightd.config.remote_change import Value, checked, differences, fixed_because, value_in
 from flightd.core.errors import InputError, RunError, UnavailableError
+from flightd.runtime.within import Within
 from flightd.vision.lines.colour_profile import read_profile
 
 _CHECK_S = 60.0
@@ -137,7 +138,7 @@ class DroneSettings:
             try:
                 with contextlib.suppress(OSError):  # the service's own limits may forbid that
                     os.setpriority(os.PRIO_PROCESS, process.pid, _GENTLY)
-                async with asyncio.timeout(_CHECK_S):
+                async with Within(_CHECK_S):
                     found, said = await process.communicate()
             except TimeoutError:
                 raise UnavailableError(f"the check did not end within {_CHECK_S:.0f} s") from None

@@ -18,6 +18,7 @@ from flightd.ground.flights.log_folder import FoundLog, FoundLogs, find_logs
 from flightd.ground.read_folders import ReadFolder
 from flightd.ground.reading_process import NotStartedError
 from flightd.ground.shown_text import shown
+from flightd.runtime.within import Within
 
 _LOG = logging.getLogger(__name__)
 _FRESH_S = 3.0
@@ -111,7 +112,7 @@ class FlightIndex:
         if log_id not in self._found and not self._is_fresh():
             looks = self._looks
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(_WITHIN_S), self._changed:
+                async with Within(_WITHIN_S), self._changed:
                     await self._changed.wait_for(lambda: log_id in self._found or self._looks > looks)
         return self._found.get(log_id)
 

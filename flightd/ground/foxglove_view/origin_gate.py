@@ -15,6 +15,7 @@ import threading
 
 from flightd.core.errors import UnavailableError
 from flightd.ground.bounded import Room
+from flightd.runtime.within import Within
 
 MOST_VIEWERS = 8
 """More are turned away: each costs memory and time."""
@@ -104,7 +105,7 @@ class OriginGate:
             self._inside.discard(viewer)
 
     async def _through(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        async with asyncio.timeout(_HEAD_S):
+        async with Within(_HEAD_S):
             head = await reader.readuntil(b"\r\n\r\n")
         if not is_let_in(head):
             await _refuse(writer, "403 Forbidden", "a page of another site")

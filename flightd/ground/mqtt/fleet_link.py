@@ -146,7 +146,7 @@ class DroneAtBroker:
                     shown_at = loop.time()
                     await self._publish(client, drone.vehicle.visualization(drone.now()))
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(_LOOK_S):
+                async with Within(_LOOK_S):
                     await drone.changed.wait()
             drone.changed.clear()
 

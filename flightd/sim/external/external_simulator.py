@@ -18,6 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.geometry import wrap_pi
 from flightd.ports import Clock
+from flightd.runtime.within import Within
 from flightd.sim.external.external_pace import PaceMonitor
 from flightd.sim.external.external_truth import Placement, TruthReader
 from flightd.sim.plant.kinematics import Kinematics
@@ -78,7 +79,7 @@ class ExternalVehicle(asyncio.Protocol, asyncio.DatagramProtocol):
         if self._line is None:
             self._line = asyncio.create_task(self._hold(), name="external truth")
         try:
-            async with asyncio.timeout(self._patience_s):
+            async with Within(self._patience_s):
                 await self._first.wait()
         except TimeoutError:
             await self.close()

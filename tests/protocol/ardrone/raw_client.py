@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator
 from typing import Any
 
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.within import Within
 from flightd.sim.ardrone.drone import Drone
 from flightd.sim.ardrone.server import ArDroneServer
 from tests.rigs.ardrone import ANY_PORTS, ended, make_drone
@@ -91,7 +92,7 @@ class RawClient(asyncio.DatagramProtocol):
         """State bits of the next packet to come once all is said."""
         await asyncio.sleep(0.02)
         self._heard.clear()
-        async with asyncio.timeout(1.0):
+        async with Within(1.0):
             await self._heard.wait()
         return self.state
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.within import Within
 from flightd.sim.ardrone.server import ArDroneServer
 from tests.rigs.ardrone import ANY_PORTS, ended, make_drone
 from tests.rigs.event_loops import real
@@ -50,7 +51,7 @@ def test_the_npm_client_flies_it() -> None:
                 stdout=asyncio.subprocess.PIPE,
             )
             try:
-                async with asyncio.timeout(120):
+                async with Within(120):
                     out, _ = await node.communicate()
             finally:
                 if node.returncode is None:

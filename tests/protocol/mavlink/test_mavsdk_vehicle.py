@@ -35,6 +35,7 @@ from flightd.ports import CountsDrops
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.event_loops import ScaledLoop
 from flightd.runtime.free_ports import free_port
+from flightd.runtime.within import Within
 from flightd.sim.autopilot.autopilot import PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
 from flightd.sim.autopilot.link import MavlinkChannel, Message
@@ -277,7 +278,7 @@ def test_a_loop_that_hangs_sends_nothing_though_the_librarys_threads_live() -> N
         serving = asyncio.create_task(peer.run())
         companion = _Companion(f"udpout://{host}:{port}")
         try:
-            async with asyncio.timeout(20.0):
+            async with Within(20.0):
                 await peer.streaming.wait()
             companion.hang()
             await asyncio.sleep(0.1)

@@ -26,6 +26,7 @@ from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.runtime.free_ports import free_port
+from flightd.runtime.within import Within
 from flightd.sim.autopilot.copter import CopterMode
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
@@ -85,7 +86,7 @@ async def restarted(
             startup_fault=fault,
         )
     )
-    async with asyncio.timeout(120):
+    async with Within(120):
         return await daemon.fly(), phases
 
 
@@ -183,7 +184,7 @@ def test_what_is_not_critical_fails_in_the_air_and_the_flight_is_still_ended_by_
             front = BrokenPart(UnavailableError("no second camera"))
             others = [BrokenPart(OSError(12, "no memory")), BrokenPart(ValueError("a fault"))]
             broken = replace(flight, front_camera=front, interlock=others[0], progress=others[1])
-            async with asyncio.timeout(120):
+            async with Within(120):
                 result = await Daemon(broken).fly()
             assert result.phase is Phase.ABORTED
             assert not rig.peer.armed
@@ -258,7 +259,7 @@ def test_a_vehicle_that_stands_armed_never_takes_off_without_its_inventory(tmp_p
             assert not flying.done()
             daemon.command(Command("order", CommandKind.START))
             with pytest.raises(type(error)) as raised:
-                async with asyncio.timeout(60):
+                async with Within(60):
                     await flying
             assert raised.value is error
             assert not rig.peer.armed

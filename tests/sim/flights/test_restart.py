@@ -18,6 +18,7 @@ from flightd.adapters.recorder.mcap_repair import is_whole
 from flightd.core.topics import Topic
 from flightd.core.types import Event, Phase
 from flightd.replay.log import read_log
+from flightd.runtime.within import Within
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.service import ServiceRig
 
@@ -50,7 +51,7 @@ async def test_killed_in_the_air_the_vehicle_levels_and_the_restart_lands_it(tmp
         await asyncio.sleep(_GUIDED_TIMEOUT_S + 1.0)
         second = await rig.start()
         phases: list[Phase] = []
-        async with asyncio.timeout(60):
+        async with Within(60):
             async for status in rig.statuses():
                 phases += [status.phase] if status.phase not in phases[-1:] else []
                 if Phase.RECOVER not in phases:
@@ -100,7 +101,7 @@ async def test_killed_in_the_air_the_vehicle_as_shipped_lands_and_the_restart_le
         await asyncio.sleep(3.0)  # more than its failsafe waits: it is coming down by itself
         second = await rig.start()
         phases: set[Phase] = set()
-        async with asyncio.timeout(60):
+        async with Within(60):
             async for status in rig.statuses():
                 phases.add(status.phase)
                 if not phases <= {Phase.PREFLIGHT, Phase.RECOVER} or status.reason == _FIT:
@@ -135,7 +136,7 @@ async def test_every_child_may_be_killed_in_flight(tmp_path: Path) -> None:
         await rig.until(lambda status: status.phase in _UP - {Phase.ACQUIRE}, 120)
         for pid in others:
             os.kill(pid, signal.SIGKILL)
-        async with asyncio.timeout(120):
+        async with Within(120):
             code = await daemon.wait()
     (log,) = rig.flights.rglob("flight.mcap")
     flight = read_log(log)

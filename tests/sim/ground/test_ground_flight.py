@@ -14,6 +14,7 @@ from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.free_ports import free_ports
+from flightd.runtime.within import Within
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.small_camera import small_camera_file
 
@@ -42,7 +43,7 @@ async def test_a_flight_is_started_watched_and_landed_from_the_ground(tmp_path: 
         stdout=asyncio.subprocess.DEVNULL,
     )
     phases: list[Phase] = []
-    async with GroundClient(address, timeout_s=60.0) as client, asyncio.timeout(240):
+    async with GroundClient(address, timeout_s=60.0) as client, Within(240):
         await client.hello()
         async for message in client.published():
             if not isinstance(message, StatusReport):

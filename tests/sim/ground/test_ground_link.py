@@ -26,6 +26,7 @@ from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.preview import CameraName, Preview
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.within import Within
 from flightd.site.site import Aisle, Edge, Node
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.ground_link import (
@@ -53,7 +54,7 @@ async def test_an_operator_is_told_what_happens_and_commands() -> None:
         await connected(client, link)
         link.event(event("look out"))
         tell_once(link, x_m=1.25)
-        async with asyncio.timeout(20):
+        async with Within(20):
             heard = [message async for message in _until_event(client)]
         assert isinstance(heard[-1], EventReport)
         assert heard[-1].text == "look out"
@@ -109,7 +110,7 @@ async def test_published_messages_are_numbered_without_a_gap() -> None:
     async with serving(local()) as link, GroundClient(address_of(link)) as client:
         await connected(client, link)
         numbers = []
-        async with asyncio.timeout(20), telling(link):
+        async with Within(20), telling(link):
             async for message in client.published():
                 assert isinstance(message, StatusReport)
                 numbers.append(message.seq)
@@ -166,7 +167,7 @@ async def test_a_stranger_hears_nothing_on_the_status_port_either(tmp_path: Path
 
         async with asyncio.TaskGroup() as tasks:
             listening = tasks.create_task(listen())
-            async with asyncio.timeout(20), telling(link):
+            async with Within(20), telling(link):
                 numbers = 0
                 async for _ in viewer.published():
                     numbers += 1
@@ -185,7 +186,7 @@ async def test_a_plain_req_socket_and_json_are_a_whole_client() -> None:
             req.linger = 0
             req.connect(address.endpoint(address.command_port))
             await req.send_json({"version": 1, "id": "my-first-order", "op": "command", "command": "start"})
-            async with asyncio.timeout(20):
+            async with Within(20):
                 answer = await req.recv_json()
         assert answer == {
             "answer": "accepted",
@@ -269,7 +270,7 @@ async def test_junk_frames_of_every_shape_leave_the_link_whole() -> None:
                 frames = [random_.randbytes(random_.randrange(60)) for _ in range(random_.randrange(1, 5))]
                 await dealer.send_multipart(frames)
             for _ in range(500):
-                async with asyncio.timeout(20):
+                async with Within(20):
                     answer = json.loads((await dealer.recv_multipart())[-1])
                 assert answer["answer"] == "refused"
         async with GroundClient(address) as client:

@@ -3,7 +3,6 @@ simulated vehicle."""
 
 from __future__ import annotations
 
-import asyncio
 import json
 from importlib import resources
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 from flightd.adapters.ground_link.client import GroundClient
 from flightd.adapters.store.sent_profiles import sent_name
 from flightd.core.errors import InputError, RunError
+from flightd.runtime.within import Within
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.service import ServiceRig
 
@@ -27,7 +27,7 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
     async with rig.world(GUID_TIMEOUT=3.0):
         daemon = await rig.start()
         await rig.until(lambda status: status.vehicle is not None)
-        async with GroundClient(rig.address, timeout_s=60.0) as client, asyncio.timeout(240):
+        async with GroundClient(rig.address, timeout_s=60.0) as client, Within(240):
             await client.hello()
             report = await client.doctor()
             while all(check.fix != "GUID_TIMEOUT" for check in report.checks):
@@ -65,7 +65,7 @@ async def test_a_standing_drone_is_looked_after_from_the_ground(tmp_path: Path) 
             assert await daemon.wait() == 0
         again = await rig.start()
         await rig.until(lambda status: status.vehicle is not None)
-        async with GroundClient(rig.address, timeout_s=60.0) as client, asyncio.timeout(60):
+        async with GroundClient(rig.address, timeout_s=60.0) as client, Within(60):
             await client.hello()
             stands = await client.settings()
             assert (stands.pending, [version.person for version in stands.versions]) == (False, ["ann"] * 2)

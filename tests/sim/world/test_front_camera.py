@@ -23,6 +23,7 @@ from flightd.core.types import Image
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from flightd.runtime.free_ports import free_port
+from flightd.runtime.within import Within
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
@@ -138,7 +139,7 @@ def test_a_renderer_that_fails_ends_its_camera(make: Callable[[], PictureMaker],
     async def main() -> None:
         address = "127.0.0.1", free_port()
         peer = CameraPeer(CAMERA, make, "seed", address, hovering, LoopClock(), hold=held)
-        async with asyncio.timeout(60.0):
+        async with Within(60.0):
             await peer.run()
 
     with pytest.raises(ExceptionGroup) as ended:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import multiprocessing
 import socket
 from pathlib import Path
@@ -13,6 +12,7 @@ from flightd.app.simulation.world_process import run_world, watch_world
 from flightd.config.paths import shipped
 from flightd.core.errors import FlightdError, RunError, UnavailableError
 from flightd.runtime.message_channel import Channel
+from flightd.runtime.within import Within
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.world import FrontSpec, WorldSpec
 from flightd.site.site_file import load_site
@@ -26,7 +26,7 @@ def death_of(spec: WorldSpec, log: Path) -> FlightdError:
         process = context.Process(target=run_world, args=(spec, 1.0, log, channel.theirs))
         process.start()
         channel.theirs.close()
-        async with asyncio.timeout(60.0):
+        async with Within(60.0):
             await watch_world(process, channel, lambda _index, _begins: None)
 
     with pytest.raises(FlightdError) as told:

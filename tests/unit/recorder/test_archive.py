@@ -15,6 +15,7 @@ from flightd.adapters.recorder.mcap_repair import is_whole
 from flightd.app.run import room_kept
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.replay.log import read_log
+from flightd.runtime.within import Within
 from tests.rigs.event_loops import real
 from tests.rigs.waiting import until
 
@@ -171,7 +172,7 @@ def test_trouble_with_the_archive_is_told_at_once_and_the_flight_goes_on(
             told.append(str(err))
             heard.set()
 
-        async with room_kept(archive, hear), asyncio.timeout(10.0):
+        async with room_kept(archive, hear), Within(10.0):
             await heard.wait()
 
     real(flight(OSError(5, "Input/output error")))

@@ -12,6 +12,7 @@ import pytest
 
 from flightd.runtime.child_process import LinkedProcess
 from flightd.runtime.message_channel import Channel, ChildEnd
+from flightd.runtime.within import Within
 from tests.rigs.event_loops import in_real_time
 from tests.rigs.waiting import until
 
@@ -117,7 +118,7 @@ async def test_the_loop_turns_while_a_large_message_comes() -> None:
     told: list[bytes] = []
     turns = 0
     process = LinkedProcess(flood, (), told.append, lambda _: None)
-    async with asyncio.timeout(30.0):
+    async with Within(30.0):
         while not told:
             turns += 1
             await asyncio.sleep(0)

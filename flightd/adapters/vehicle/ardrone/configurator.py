@@ -17,6 +17,7 @@ from flightd.adapters.vehicle.ardrone.at import AtCommand
 from flightd.adapters.vehicle.ardrone.navdata import DroneState, Navdata, Option
 from flightd.adapters.vehicle.ardrone.refusal import KeepsValue
 from flightd.adapters.vehicle.ardrone.settings import ArDroneSettings
+from flightd.runtime.within import Within
 
 _log = logging.getLogger(__name__)
 
@@ -170,7 +171,7 @@ class Configurator:
 
     async def _fetch(self) -> bytes:
         """Raises `OSError` or `TimeoutError` when the port does not deliver."""
-        async with asyncio.timeout(_READ_TIMEOUT_S):
+        async with Within(_READ_TIMEOUT_S):
             reader, writer = await asyncio.open_connection(
                 self._settings.host, self._settings.control_port, limit=_MAX_TEXT_BYTES
             )
@@ -187,7 +188,7 @@ class Configurator:
         time.  A bit that is clear already is left alone.  Raises `TimeoutError` when no packet came."""
         heard = False
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(ACK_TIMEOUT_S):
+            async with Within(ACK_TIMEOUT_S):
                 if not acknowledged:
                     newest = await self._link.packet()
                     heard = True
@@ -196,7 +197,7 @@ class Configurator:
                 while True:
                     self._link.send(*commands)
                     with contextlib.suppress(TimeoutError):
-                        async with asyncio.timeout(_REPEAT_S):
+                        async with Within(_REPEAT_S):
                             while _acknowledged(await self._link.packet()) != acknowledged:
                                 heard = True
                             return True

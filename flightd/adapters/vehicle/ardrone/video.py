@@ -20,6 +20,7 @@ from flightd.core.extras import missing_extra
 from flightd.core.types import Image
 from flightd.ports import Clock
 from flightd.runtime.clock import Hold
+from flightd.runtime.within import Within
 from flightd.tracking.device_clock import DeviceClock
 
 _log = logging.getLogger(__name__)
@@ -171,13 +172,13 @@ class VideoStream:
 
     async def _connection(self) -> None:
         """One connection, until it ends or falls silent."""
-        async with asyncio.timeout(SILENCE_S):
+        async with Within(SILENCE_S):
             reader, writer = await asyncio.open_connection(*self._address)
         self.connections += 1
         parser = PaveParser()
         try:
             while True:
-                async with asyncio.timeout(SILENCE_S):
+                async with Within(SILENCE_S):
                     chunk = await reader.read(_CHUNK_BYTES)
                 if not chunk:
                     return

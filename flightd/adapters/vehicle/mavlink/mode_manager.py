@@ -375,6 +375,6 @@ class ModeArmingManager:
     async def _pause(self, duration_s: float) -> None:
         """Wait, or until the demand or the vehicle's owner changes."""
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(duration_s):
+            async with Within(duration_s):
                 await self._wake.wait()
         self._wake.clear()

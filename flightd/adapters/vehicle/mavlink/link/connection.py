@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable
 from enum import Enum
 
@@ -13,6 +12,7 @@ from flightd.adapters.vehicle.mavlink.link.endpoint import Endpoint
 from flightd.adapters.vehicle.mavlink.link.reconnection import Reconnection
 from flightd.adapters.vehicle.mavlink.link.transport import Source, Transport
 from flightd.ports import Clock
+from flightd.runtime.within import Within
 
 _HEARTBEAT_S = 0.05
 _PARSERS_MAX = 16
@@ -96,7 +96,7 @@ class MavlinkLink:
             )
             self._pass(self._beats.pack(beat))
             try:
-                async with asyncio.timeout(_HEARTBEAT_S):
+                async with Within(_HEARTBEAT_S):
                     await lost.wait()
             except TimeoutError:
                 continue

@@ -22,6 +22,7 @@ from flightd.adapters.vehicle.mavlink.link.endpoint import Endpoint, EndpointKin
 from flightd.core.errors import InputError, UnavailableError
 from flightd.runtime.batched_reader import PacedReader
 from flightd.runtime.datagrams import Datagrams, OpenDatagrams, open_datagrams
+from flightd.runtime.within import Within
 
 Source: TypeAlias = tuple[str, int] | None
 """Address a datagram came from; None on a stream."""
@@ -133,7 +134,7 @@ class TcpTransport(Transport, asyncio.Protocol):
     async def open(self) -> None:
         loop = asyncio.get_running_loop()
         try:
-            async with asyncio.timeout(_CONNECT_S):
+            async with Within(_CONNECT_S):
                 self._transport, _ = await loop.create_connection(
                     lambda: self, self.endpoint.host, self.endpoint.port
                 )

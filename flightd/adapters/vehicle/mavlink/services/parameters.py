@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.link.connection import MavlinkLink
 from flightd.adapters.vehicle.mavlink.parameter_rule import Names
+from flightd.runtime.within import Within
 
 _ANSWER_S = 0.4
 _ATTEMPTS = 3
@@ -116,7 +117,7 @@ class Parameters:
             self._arrived.clear()
             send()
             try:
-                async with asyncio.timeout(_ANSWER_S):
+                async with Within(_ANSWER_S):
                     while not done():
                         await self._arrived.wait()
                         self._arrived.clear()
