@@ -28,6 +28,7 @@ import numpy as np
 
 from flightd.app.build import scanner_of
 from flightd.config.schema import Config, load_config
+from flightd.core.count_choice import CountChoice
 from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding
 from flightd.mission.plan.sweep_leg import SweepLeg
@@ -181,11 +182,12 @@ def passes(site: Site, flight: Flight, seed: int) -> Iterator[Passed]:
     """Fly past, read, and tell what became of each label."""
     scanner = scanner_of(flight.config, site)
     assert isinstance(scanner, Scanner)
-    scanner.choose([_LEVEL])
+    choice = CountChoice((_LEVEL,))
+    scanner.choose(choice)
     nodes = list(site.nodes)
     legs = scanner.legs(nodes, nodes[0], math.pi / 2, 1.4)
     leg = next(leg for leg in legs if leg.locations[0] in flight.boxes)
-    told = scanner.told_sweeps([nodes], [_LEVEL])[0]
+    told = scanner.told_sweeps([nodes], choice)[0]
     found = {finding.location: finding for finding in _fly_past(site, leg, scanner, flight, seed)}
     for code, box in flight.boxes.items():
         finding = found.get(code)

@@ -111,7 +111,8 @@ class Tick:
     def _record_plan(self, now_ns: int) -> None:
         """What is flown in the order's place, for whoever reads the log."""
         standing = self._flight.pilot.mission.standing
-        chosen = ChosenPlan(standing.id, standing.nodes if standing.id else (), standing.levels)
+        nodes = standing.nodes if standing.id else ()
+        chosen = ChosenPlan(standing.id, nodes, standing.levels, standing.counts)
         self._flight.recorder.record(Topic.PLAN, now_ns, chosen)
 
     def _possible_commands(self) -> frozenset[CommandKind]:

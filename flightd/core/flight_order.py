@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flightd.core.count_choice import ShelfCount
+
 
 @dataclass(frozen=True, slots=True)
 class FlightOrder:
@@ -21,8 +23,9 @@ class FlightOrder:
 @dataclass(frozen=True, slots=True)
 class ChosenPlan:
     """What somebody chose in the order's place before the start, by the command `id`: these `nodes`, counted
-    on these `levels` (none: all).  No nodes: as ordered again."""
+    on these `levels` (none: all), or only what is of `counts`.  No nodes: as ordered again."""
 
     id: str
     nodes: tuple[str, ...] = ()
     levels: tuple[int, ...] = ()
+    counts: tuple[ShelfCount, ...] | None = None

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from flightd.core.count_choice import ShelfCount
+
 MOST_NODES = 500
 """A plan over more nodes is refused: it is read and checked between two ticks."""
 
@@ -79,13 +81,15 @@ class PlannedSweep:
 @dataclass(frozen=True, slots=True)
 class StandingPlan:
     """The plan of this flight: `id` of the order that it came with (empty: that of the configuration), its
-    nodes and levels, which of them were `visited` and which it still wants to visit."""
+    nodes and levels, which of them were `visited` and which it still wants to visit; `counts` if only what is
+    of these is counted at its nodes."""
 
     id: str
     nodes: tuple[str, ...]
     levels: tuple[int, ...]
     visited: tuple[str, ...]
     remaining: tuple[str, ...]
+    counts: tuple[ShelfCount, ...] | None = None
 
 
 class Planner(Protocol):
@@ -97,8 +101,14 @@ class Planner(Protocol):
         ...
 
     def planned(
-        self, nodes: Sequence[str], levels: Sequence[int], *, best_order: bool, waits: bool = False
+        self,
+        nodes: Sequence[str],
+        levels: Sequence[int],
+        *,
+        best_order: bool,
+        waits: bool = False,
+        counts: tuple[ShelfCount, ...] | None = None,
     ) -> PlannedFlight:
-        """What a flight over the nodes (none: those of the configuration) would be; changes nothing.
-        InputError where it cannot be flown."""
+        """What a flight over the nodes (none: those of the configuration) would be, counting as `Command`
+        says; changes nothing.  InputError where it cannot be flown."""
         ...

@@ -15,6 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from flightd.core.count_choice import ShelfCount
 from flightd.core.refusal import Refusal
 from flightd.core.tracks import NOT_SEEN, SensorEstimate
 
@@ -391,16 +392,18 @@ class Command:
     """An operator's order; `node` only with GOTO.
 
     PLAN: to visit `nodes` in that order with the next start (none: what the configuration says) and to count
-    what hangs on the shelf `levels` there (none: on all).  START with `plan`: only if the plan that stands is
-    the one that was ordered with this id.  PLAN and GOTO that `waits`: at the end hold there until another
-    order, rather than fly home.  GOTO that `lands`: on the pad of that node, to wait there for another
-    flight."""
+    what hangs on the shelf `levels` there (none: on all).  With `counts` only what is of these is counted of
+    all that its nodes see, and of what the node of a GOTO sees; a GOTO without has that counted as the plan's
+    levels say.  START with `plan`: only if the plan that stands is the one that was ordered with this id.
+    PLAN and GOTO that `waits`: at the end hold there until another order, rather than fly home.  GOTO that
+    `lands`: on the pad of that node, to wait there for another flight."""
 
     id: str
     kind: CommandKind
     node: str = ""
     nodes: tuple[str, ...] = ()
     levels: tuple[int, ...] = ()
+    counts: tuple[ShelfCount, ...] | None = None
     plan: str = ""
     waits: bool = False
     lands: bool = False

@@ -13,6 +13,7 @@ from typing import Any, Protocol, TypeVar
 from flightd.adapters.ground_link.client import Address, GroundClient
 from flightd.adapters.ground_link.messages.answers import Accepted, PlanAnswer, Planned, Welcome
 from flightd.adapters.ground_link.messages.base import Role
+from flightd.adapters.ground_link.messages.counts import Counts
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import FlightdError, InputError, RunError, TransientError, UnavailableError
 from flightd.core.preview import CameraName
@@ -141,8 +142,9 @@ class DroneLink:
             self._tell_state()
             await asyncio.sleep(_AGAIN_S)
 
-    async def act(self, act: Act, *, by_person: bool = True) -> Accepted:
-        """Hand an act to the drone; its answer.  As `GroundClient` raises; RunError where too many wait."""
+    async def act(self, act: Act, *, by_person: bool = True, counts: Counts = None) -> Accepted:
+        """Hand an act to the drone, a goto with what is counted at its node; its answer.  As
+        `GroundClient` raises; RunError where too many wait."""
         if by_person:
             self._note_person()
         with self._one_more_act(urgent=act.command in _URGENT) as client:
@@ -158,6 +160,7 @@ class DroneLink:
                 plan=act.plan,
                 waits=act.waits,
                 lands=act.lands,
+                counts=counts,
             )
 
     async def plan_flight(
@@ -172,6 +175,7 @@ class DroneLink:
         seen_ns: int = 0,
         waits: bool = False,
         by_person: bool = True,
+        counts: Counts = None,
     ) -> Planned:
         """Hand the drone the nodes of its next flight, or ask what that would be.  As `act` raises."""
         if by_person and not dry:
@@ -186,6 +190,7 @@ class DroneLink:
                 session=session or None,
                 seen_ns=seen_ns or None,
                 waits=waits,
+                counts=counts,
             )
 
     @contextmanager

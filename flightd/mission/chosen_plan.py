@@ -1,4 +1,4 @@
-"""A flight over nodes and levels that somebody chose: checked, ordered, planned and estimated.  Pure."""
+"""A flight over nodes and shelves that somebody chose: checked, ordered, planned and estimated.  Pure."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flightd.config.schema import Config
+from flightd.core.count_choice import ALL, CountChoice
 from flightd.core.errors import InputError
 from flightd.core.planned_flight import MOST_NODES, PlannedFlight
 from flightd.mission.battery.outings import Supply, WaysOfPlan, flown_on
@@ -44,7 +45,7 @@ class ChosenPlans:
     def plan(
         self,
         nodes: Sequence[str],
-        levels: Sequence[int] = (),
+        choice: CountChoice = ALL,
         *,
         best_order: bool = False,
         waits: bool = False,
@@ -54,7 +55,7 @@ class ChosenPlans:
         that the site lacks, that no open line leads to or that a full battery does not reach and come back
         from, and for levels that nothing is counted on."""
         wanted = tuple(dict.fromkeys(nodes))
-        self._check(wanted, levels)
+        self._check(wanted, choice)
         first = self._first
         if best_order and len(wanted) <= _BEST_OF:
             ends, yaw = (first.start, first.home), first.start_yaw_rad
@@ -64,7 +65,7 @@ class ChosenPlans:
             wanted = tuple(sorted(wanted, key=lambda node: place.get(node, len(place))))
         ends, yaw_rad = (first.start, first.home), first.start_yaw_rad
         plan = make_plan(self._site, wanted, *ends, self._policy, yaw_rad, waits=waits)
-        far = self._sorties(levels, by_stopping=waits).out_of_reach(wanted)
+        far = self._sorties(choice, by_stopping=waits).out_of_reach(wanted)
         if far:
             raise InputError(
                 f"a full battery does not reach {_listed(far)}, last for the stop there and come back with"
@@ -75,7 +76,7 @@ class ChosenPlans:
     def estimate(
         self,
         plan: FlightPlan,
-        levels: Sequence[int],
+        choice: CountChoice,
         charge: float,
         rate_per_s: float,
         *,
@@ -85,17 +86,17 @@ class ChosenPlans:
         being used in each second in the air, and nothing counted in passing if `by_stopping`.  Each view of a
         shelf is looked from once, for its longest."""
         nodes = tuple(stop.node for stop in plan.stops if stop.visit)
-        sorties = self._sorties(levels, by_stopping=by_stopping)
+        sorties = self._sorties(choice, by_stopping=by_stopping)
         way, site = [plan.start, *(stop.node for stop in plan.stops)], self._site
         metres = sum(site.length_m(site.path(a, b)) for a, b in itertools.pairwise(way))
         ways_s = WaysOfPlan.of(site, plan, self._pace)
         places = [
-            code for node in dict.fromkeys(nodes) for code in sorted(self._scanner.places_at(node, levels))
+            code for node in dict.fromkeys(nodes) for code in sorted(self._scanner.places_at(node, choice))
         ]
         flown = flown_on(sorties, plan, ways_s, Supply(charge, rate_per_s, self._config.battery.reserve))
         return PlannedFlight(
             nodes=nodes,
-            levels=tuple(levels),
+            levels=choice.levels,
             way=tuple(way),
             places=len(places),
             way_m=metres,
@@ -103,16 +104,16 @@ class ChosenPlans:
             batteries=flown.batteries,
             charge=charge,
             battery_s=(1.0 - self._config.battery.reserve) / rate_per_s,
-            sweeps=() if by_stopping else self._scanner.told_sweeps(runs_of(site, plan.stops), levels),
+            sweeps=() if by_stopping else self._scanner.told_sweeps(runs_of(site, plan.stops), choice),
             unread=unread_labels(site, self._config, places),
         )
 
-    def _sorties(self, levels: Sequence[int], *, by_stopping: bool) -> Sorties:
+    def _sorties(self, choice: CountChoice, *, by_stopping: bool) -> Sorties:
         return Sorties(
-            self._site, self._legs, self._config.battery, self._scanner, levels, by_stopping=by_stopping
+            self._site, self._legs, self._config.battery, self._scanner, choice, by_stopping=by_stopping
         )
 
-    def _check(self, nodes: Sequence[str], levels: Sequence[int]) -> None:
+    def _check(self, nodes: Sequence[str], choice: CountChoice) -> None:
         if not nodes:
             raise InputError("no node is chosen")
         if len(nodes) > MOST_NODES:
@@ -121,10 +122,10 @@ class ChosenPlans:
             )
         if unknown := [node for node in nodes if node not in self._site.nodes]:
             raise InputError(f"no node {_listed(unknown)} on site {self._site.name}")
-        if levels and not self._scanner.counts:
+        if choice.levels and not self._scanner.counts:
             raise InputError("this flight counts no shelves: leave the levels out")
-        if levels and not any(self._scanner.places_at(node, levels) for node in nodes):
-            texts = ", ".join(map(str, levels))
+        if choice.levels and not any(self._scanner.places_at(node, choice) for node in nodes):
+            texts = ", ".join(map(str, choice.levels))
             raise InputError(f"nothing is counted on level {texts} at any of these nodes")
 
 

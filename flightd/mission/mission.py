@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
+from flightd.core.count_choice import CountChoice, ShelfCount
 from flightd.core.errors import InputError
 from flightd.core.outlook import Outlook
 from flightd.core.planned_flight import PlannedFlight, StandingPlan
@@ -167,12 +168,19 @@ class Mission:
         return self._plan.standing(self.visited, self.remaining)
 
     def planned(
-        self, nodes: Sequence[str], levels: Sequence[int], *, best_order: bool, waits: bool = False
+        self,
+        nodes: Sequence[str],
+        levels: Sequence[int],
+        *,
+        best_order: bool,
+        waits: bool = False,
+        counts: tuple[ShelfCount, ...] | None = None,
     ) -> PlannedFlight:
         """What a flight over the nodes would be, from the pad that it stands on first and with the battery as
         it is told now (none: what the configuration says); changes nothing.  InputError where it
         cannot be flown."""
-        return self._plan.planned(nodes, levels, self._charging.charge, best_order=best_order, waits=waits)
+        choice = CountChoice.of(tuple(levels), counts)
+        return self._plan.planned(nodes, choice, self._charging.charge, best_order=best_order, waits=waits)
 
     def outlook(self, now_ns: int) -> Outlook:
         """What it expects and what troubles it."""
@@ -217,7 +225,9 @@ class Mission:
         elif kind is CommandKind.GOTO:
             self._route.shorten(self._pose)
             halted = self.phase is Phase.HOLD
-            self._route.go_to(now_ns, command.node, waits=command.waits, lands=command.lands, halted=halted)
+            waits, lands = command.waits, command.lands
+            if self._route.go_to(now_ns, command.node, waits=waits, lands=lands, halted=halted):
+                self._plan.count_at(command.node, command.counts)
 
     def _take_plan(self, command: Command, now_ns: int) -> None:
         """Fly other nodes with the next start, or again what the configuration says; one that cannot be flown

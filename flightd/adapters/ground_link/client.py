@@ -28,6 +28,7 @@ from flightd.adapters.ground_link.messages.answers import (
     Welcome,
 )
 from flightd.adapters.ground_link.messages.base import VERSION
+from flightd.adapters.ground_link.messages.counts import Counts
 from flightd.adapters.ground_link.messages.maintenance import (
     MOST_PROFILE_BYTES,
     AskDoctor,
@@ -173,11 +174,12 @@ class GroundClient:
         plan: str = "",
         waits: bool = False,
         lands: bool = False,
+        counts: Counts = None,
     ) -> Accepted:
         """Give a command; sent again until it is answered, done once.  It is for the flight `session`, given
         by who saw the status of `seen_ns`; left out: this client's, and the newest that it heard.  A start
         may name the `plan` that it is for; a goto that `waits` leads to a node to hold there, one that
-        `lands` down onto its pad."""
+        `lands` down onto its pad; `counts` is all that is counted at its node."""
         order = Order(
             version=VERSION,
             id=order_id or _new_id(),
@@ -188,6 +190,7 @@ class GroundClient:
             seen_ns=self._seen_ns if seen_ns is None else seen_ns,
             waits=waits,
             lands=lands,
+            counts=counts,
         )
         return await self._ask(order, Accepted)
 
@@ -202,9 +205,11 @@ class GroundClient:
         session: str | None = None,
         seen_ns: int | None = None,
         waits: bool = False,
+        counts: Counts = None,
     ) -> Planned:
         """Hand a drone that stands disarmed the nodes of its next flight, at whose end it holds where it
-        `waits`, or (`dry`) only ask what that would be; the rest as `order`."""
+        `waits`, or (`dry`) only ask what that would be; `counts` is all that is counted, in place of
+        `levels`; the rest as `order`."""
         request = PlanFlight(
             version=VERSION,
             id=order_id or _new_id(),
@@ -215,6 +220,7 @@ class GroundClient:
             session=self.session if session is None else session,
             seen_ns=self._seen_ns if seen_ns is None else seen_ns,
             waits=waits,
+            counts=counts,
         )
         return await self._ask(request, Planned)
 

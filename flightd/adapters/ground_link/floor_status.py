@@ -13,19 +13,19 @@ from flightd.adapters.ground_link.messages.floor import (
     FloorWay,
 )
 from flightd.site.racks import bay_edges
-from flightd.site.site import Shelf, Site
+from flightd.site.site import Node, Shelf, Side, Site
 
 
 def floor_status(site: Site) -> FloorStatus:
     """The map as it goes over the link."""
-    levels: dict[str, set[int]] = {}
+    levels: dict[tuple[str, Side], set[int]] = {}
     for location in site.locations.values():
-        levels.setdefault(location.node, set()).add(location.level)
+        levels.setdefault((location.node, location.side), set()).add(location.level)
     return FloorStatus(
         name=site.name,
         home=site.home.node,
         nodes=tuple(
-            FloorNode(node.id, node.x_m, node.y_m, node.aisle, tuple(sorted(levels.get(node.id, ()))))
+            _node(node, *(levels.get((node.id, side), set()) for side in (Side.LEFT, Side.RIGHT)))
             for node in site.nodes.values()
         ),
         lines=tuple(FloorLine(line.x0_m, line.y0_m, line.x1_m, line.y1_m) for line in site.lines),
@@ -57,6 +57,11 @@ def floor_status(site: Site) -> FloorStatus:
         ),
         unattended_start=site.unattended_start,
     )
+
+
+def _node(node: Node, left: set[int], right: set[int]) -> FloorNode:
+    both = (tuple(sorted(levels)) for levels in (left | right, left, right))
+    return FloorNode(node.id, node.x_m, node.y_m, node.aisle, *both)
 
 
 def _bays(site: Site, front: Shelf) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ from flightd.adapters.ground_link.messages.answers import (
     PlannedPass,
     PlannedUnread,
 )
+from flightd.adapters.ground_link.messages.counts import Counts, shelf_counts
 from flightd.adapters.ground_link.messages.requests import AskPlan, PlanFlight
 from flightd.core.errors import InputError
 from flightd.core.planned_flight import Planner
@@ -44,7 +45,11 @@ class PlanAnswers:
         self._lately.append(now_ns)
         try:
             plan = self._planner.planned(
-                request.nodes, request.levels, best_order=request.best_order, waits=request.waits
+                request.nodes,
+                request.levels,
+                best_order=request.best_order,
+                waits=request.waits,
+                counts=shelf_counts(request.counts),
             )
         except InputError as err:
             return Code.PLAN, str(err)
@@ -75,4 +80,5 @@ class PlanAnswers:
             levels=plan.levels,
             visited=plan.visited,
             remaining=plan.remaining,
+            counts=msgspec.convert(plan.counts, Counts, from_attributes=True),
         )

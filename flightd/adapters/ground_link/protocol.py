@@ -26,6 +26,7 @@ from flightd.adapters.ground_link.messages.answers import (
     StatusAnswer,
     Welcome,
 )
+from flightd.adapters.ground_link.messages.counts import NodeCount
 from flightd.adapters.ground_link.messages.floor import (
     CameraOptics,
     FloorArea,
@@ -128,7 +129,7 @@ ANSWERS = (
     DoctorAnswer, SettingsAnswer,
 )  # fmt: skip
 PARTS = (
-    Position, SeenLine, VehicleReport, LinkReport, SensorReport, HazardReport, FloorStatus, FloorNode,
-    FloorLine, FloorRack, FloorArea, FloorPad, FloorWay, CameraOptics, PictureLine, PictureArea, CheckReport,
-    ExposureReport, KeyReport, KeptVersion, KeyChange,
+    NodeCount, Position, SeenLine, VehicleReport, LinkReport, SensorReport, HazardReport, FloorStatus,
+    FloorNode, FloorLine, FloorRack, FloorArea, FloorPad, FloorWay, CameraOptics, PictureLine, PictureArea,
+    CheckReport, ExposureReport, KeyReport, KeptVersion, KeyChange,
 )  # fmt: skip

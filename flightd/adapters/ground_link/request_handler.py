@@ -25,6 +25,7 @@ from flightd.adapters.ground_link.messages.answers import (
     Welcome,
 )
 from flightd.adapters.ground_link.messages.base import VERSION, Role
+from flightd.adapters.ground_link.messages.counts import shelf_counts
 from flightd.adapters.ground_link.messages.floor import CameraOptics
 from flightd.adapters.ground_link.messages.maintenance import Maintenance
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
@@ -85,6 +86,7 @@ class RequestHandler:
     ) -> None:
         self._nodes = frozenset(site.nodes)
         self._pads = frozenset(pad.node for pad in site.pads)
+        self._locations = site.locations
         self._floor = floor_status(site)
         self._session = session
         self._audit = audit
@@ -168,7 +170,12 @@ class RequestHandler:
             return self._refuse(request.id, Code.UNAVAILABLE, missing) if missing else request
         if self._inventory is None:
             return self._refuse(request.id, Code.UNAVAILABLE, "this flightd keeps no inventory store")
-        return InventoryAnswer(request=request.id, places=tuple(self._inventory()))
+        return InventoryAnswer(request=request.id, places=tuple(map(self._placed, self._inventory())))
+
+    def _placed(self, row: dict[str, str]) -> dict[str, str]:
+        """A row of the inventory, with the side and level of its location."""
+        at = self._locations.get(row.get("location", ""))
+        return row if at is None else {"location": at.code, "side": at.side, "level": str(at.level), **row}
 
     def _no_picture(self, request: AskPicture) -> str:
         if self._picture_fps == 0:
@@ -196,7 +203,13 @@ class RequestHandler:
     def _order(self, order: Order, peer: Peer, now_ns: int) -> Answer:
         """Accept, refuse or repeat an order, and write down which."""
         command = Command(
-            order.id, order.command, order.node, plan=order.plan, waits=order.waits, lands=order.lands
+            order.id,
+            order.command,
+            order.node,
+            counts=shelf_counts(order.counts),
+            plan=order.plan,
+            waits=order.waits,
+            lands=order.lands,
         )
         repeated = self._repeated(command, peer)
         if repeated is not None:
@@ -236,7 +249,12 @@ class RequestHandler:
     def _plan_flight(self, request: PlanFlight, peer: Peer, now_ns: int) -> Answer:
         """What a flight over the nodes is, handed to the mission unless it is only asked for."""
         command = Command(
-            request.id, CommandKind.PLAN, nodes=request.nodes, levels=request.levels, waits=request.waits
+            request.id,
+            CommandKind.PLAN,
+            nodes=request.nodes,
+            levels=request.levels,
+            counts=shelf_counts(request.counts),
+            waits=request.waits,
         )
         if not request.dry and (repeated := self._repeated(command, peer)) is not None:
             return repeated
@@ -308,7 +326,7 @@ class RequestHandler:
                 "flightd was started anew since; say hello again",
             ),
             (
-                (kind is CommandKind.GOTO) != bool(node),
+                (kind is CommandKind.GOTO) != bool(node) or (order.counts is not None and not node),
                 Code.MALFORMED,
                 "goto needs a node, the other commands have none",
             ),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from flightd.app.build import plan_of
 from flightd.app.simulation.simulation import Simulation
+from flightd.core.count_choice import ALL, CountChoice
 from flightd.core.types import Command, CommandKind, Event, EventLevel
 from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.replay.log import FlightLog
@@ -13,10 +14,10 @@ from flightd.replay.log import FlightLog
 
 @dataclass(frozen=True, slots=True)
 class MeantFlight:
-    """The plan, and the shelf levels that were to be counted on it (none: all)."""
+    """The plan, and what was to be counted on it."""
 
     plan: FlightPlan
-    levels: tuple[int, ...] = ()
+    choice: CountChoice = ALL
 
     @property
     def nodes(self) -> frozenset[str]:
@@ -36,7 +37,9 @@ def meant_flight(simulation: Simulation, flown: FlightLog) -> MeantFlight:
     if not ordered.nodes:
         return MeantFlight(simulation.plan())
     order = replace(simulation.setting.order, nodes=ordered.nodes, best_order=False)
-    return MeantFlight(plan_of(simulation.config, simulation.site, order), ordered.levels)
+    return MeantFlight(
+        plan_of(simulation.config, simulation.site, order), CountChoice.of(ordered.levels, ordered.counts)
+    )
 
 
 def _tells_of_a_plan(event: Event) -> bool:

@@ -48,11 +48,11 @@ def stock_summary(simulation: Simulation, meant: MeantFlight, flight_time_s: flo
     truth, records = truth_of(simulation), _records(simulation.folder)
     if not truth or records is None:
         return {"codes_expected": 0, "codes_read": 0, "codes_wrong": 0, "locations_per_hour": 0.0}
-    locations = simulation.site.locations
+    at = simulation.site.locations
     planned = {
         code
         for code, place in truth.items()
-        if place.node in meant.nodes and (not meant.levels or locations[code].level in meant.levels)
+        if place.node in meant.nodes and meant.choice.takes(place.node, at[code].side, at[code].level)
     }
     scored = score_stock(truth, records, planned).as_summary()
     hours = flight_time_s / 3600

@@ -58,6 +58,11 @@ class ActionQueue:
         return any(one.status in _GOING for one in self._all.values())
 
     @property
+    def due(self) -> tuple[Action, ...]:
+        """Those of the nodes that are reached, as far as they are not over."""
+        return tuple(self._all[one].action for one in self._due)
+
+    @property
     def stops_driving(self) -> bool:
         """Whether the vehicle has to stand still for one that is due."""
         return any(self._all[one].action.blocking_type.stops_driving for one in self._due)

@@ -11,9 +11,9 @@ from flightd.site.site import Side
 @dataclass(frozen=True, slots=True)
 class Floor:
     """`ways` are the open ones in the directions in which they are; `shelves` the sides on which a node has
-    one."""
+    one, and the levels on which places hang there (None: that is not told)."""
 
     map_id: str
     nodes: frozenset[str]
     ways: frozenset[tuple[str, str]]
-    shelves: Mapping[str, frozenset[Side]]
+    shelves: Mapping[str, Mapping[Side, frozenset[int] | None]]

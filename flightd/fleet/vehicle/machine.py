@@ -18,7 +18,7 @@ from flightd.fleet.vda5050.codec import Version
 from flightd.fleet.vda5050.errors import ErrorType
 from flightd.fleet.vda5050.factsheet import Factsheet
 from flightd.fleet.vda5050.order import InstantActions, Node, Order
-from flightd.fleet.vda5050.parts import Header
+from flightd.fleet.vda5050.parts import Action, Header
 from flightd.fleet.vda5050.state import (
     Connection,
     ConnectionState,
@@ -144,6 +144,13 @@ class Vehicle:
     def ahead(self) -> tuple[str, ...]:
         """The nodes that the drone was told last to fly along, as far as it has not reached them."""
         return tuple(stop.node for stop in self._commanded)
+
+    @property
+    def actions(self) -> dict[str, tuple[Action, ...]]:
+        """The order's actions at each node of the base when the drone comes there next; where some are not over
+        at the node that it is at, these."""
+        found = {node.node_id: tuple(node.actions) for node in reversed(self._route.base)}
+        return found | ({self.last_node: self._actions.due} if self._actions.due else {})
 
     def is_over(self, action_id: str) -> bool:
         """Whether an action of the order goes on no more, or is not known."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import itertools
 import uuid
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from flightd.fleet.vda5050.codec import Version
 from flightd.fleet.vda5050.order import Edge, InstantActions, Node, Order
-from flightd.fleet.vda5050.parts import Action, ActionParameter, BlockingType
+from flightd.fleet.vda5050.parts import Action, BlockingType
 from flightd.fleet.vehicle.abilities import SCAN_SHELF
 
 VERSION: Final = Version.V3_0
@@ -70,15 +70,9 @@ class BaseOrders:
         )
 
 
-def scan(side: str, levels: Iterable[int]) -> Action:
-    """To count everything at a node, which has a shelf on this side."""
-    told: dict[str, str | list[int]] = {"side": side, "levels": [*levels]}
-    return Action(
-        action_type=SCAN_SHELF,
-        action_id=uuid.uuid4().hex,
-        blocking_type=BlockingType.HARD,
-        action_parameters=[ActionParameter(key=key, value=value) for key, value in told.items()],
-    )
+def scan() -> Action:
+    """To count everything at a node."""
+    return Action(action_type=SCAN_SHELF, action_id=uuid.uuid4().hex, blocking_type=BlockingType.HARD)
 
 
 def instant(kind: str) -> InstantActions:

@@ -26,7 +26,6 @@ from flightd.ground.mqtt.managed_drone import ManagedDrone
 from flightd.ground.mqtt.order_flight import WAITS
 from flightd.ground.mqtt.safe_return import Standing
 from flightd.mission.machine import FLYING
-from flightd.site.site import Side
 
 _LOG = logging.getLogger(__name__)
 RESERVE: Final = 0.15
@@ -87,9 +86,7 @@ class FleetDrone:
         self._called_off_s = -math.inf
         self._stands_since_s = 0.0
         self.air = DroneAir(name, floor, drone.stands_on)
-        self._levels = sorted({level for node in floor.nodes for level in node.levels})
-        self._sides = {(rack.aisle, rack.side) for rack in floor.racks}
-        self._faces = {node.id: node.aisle for node in floor.nodes if node.levels}
+        self._faces = {node.id for node in floor.nodes if node.levels}
         drone.on_decided = self._hear_decided
         self._recalled: KeptDrone | None = None
         self.may_start = True
@@ -401,13 +398,11 @@ class FleetDrone:
 
     def _order_step(self, step: _Step, orders: BaseOrders) -> None:
         node = self._node_of(step)
-        aisle = self._faces.get(node)
-        sides = [side for side in Side if (aisle, side.value) in self._sides]
         counts = self.drone.standing is not None and self.drone.standing.counts
         if step.action.act is Act.FLY:
             step.sequence = orders.node(node)
-        elif step.action.act is Act.COUNT and counts and sides:
-            action = scan(sides[0], self._levels)
+        elif step.action.act is Act.COUNT and counts and node in self._faces:
+            action = scan()
             step.sequence, step.count = orders.do_at_end([action]), action.action_id
         else:
             step.sequence = orders.end[1]

@@ -21,8 +21,18 @@ def floor_of_link(floor: FloorStatus) -> Floor:
     sides: dict[str, set[Side]] = {}
     for rack in floor.racks:
         sides.setdefault(rack.aisle, set()).add(Side(rack.side))
-    shelves = {node.id: frozenset(sides.get(node.aisle, ())) for node in floor.nodes}
+    # a floor without a single place is one whose places nobody has named
+    told = any(node.levels for node in floor.nodes)
+    shelves = {
+        node.id: {side: _levels(node, side) if told else None for side in sides.get(node.aisle, ())}
+        for node in floor.nodes
+    }
     return Floor(floor.name, frozenset(shelves), frozenset(open_ways(floor)), shelves)
+
+
+def _levels(node: FloorNode, side: Side) -> frozenset[int] | None:
+    levels = node.left if side is Side.LEFT else node.right
+    return None if levels is None else frozenset(levels)
 
 
 def node_of_pad(floor: FloorStatus, pad: FloorPad) -> str:

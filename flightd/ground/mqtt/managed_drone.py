@@ -49,7 +49,7 @@ from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck,
 from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
 from flightd.ground.mqtt.sent_commands import SentCommands
-from flightd.ground.mqtt.shelf_counts import ShelfCounts, levels_of
+from flightd.ground.mqtt.shelf_counts import ShelfCounts, counts_of
 
 _LOG = logging.getLogger(__name__)
 MANUFACTURER: Final = "flightd"
@@ -130,11 +130,10 @@ class ManagedDrone:
         self._acting: asyncio.Task[None] | None = None
         self._did: tuple[Next, float, int] = (None, 0.0, 0)
         """The last act, when it was answered, and the status by which it shows."""
-        self._order: Order | None = None
         self._ahead: list[str] = []
         self._counts = ShelfCounts()
         self._plans: deque[str] = deque(maxlen=_MOST_PLANS)
-        self._planned: tuple[str, tuple[str, ...]] | None = None
+        self._planned: tuple[str, PlanNext] | None = None
         self._trouble: tuple[ErrorType, str] | None = None
         self._rests_since_s: float | None = None
         self._before = StationBefore()
@@ -217,6 +216,8 @@ class ManagedDrone:
         """A person commands the drone from now on, or gives it back."""
         if taken and self._acting is not None:
             self._acting.cancel()  # nothing of the manager's is sent after it
+        if taken:
+            self._counts.given = ()
         if taken is not self._taken:
             self._taken = taken
             self.on_taken(taken)
@@ -231,6 +232,7 @@ class ManagedDrone:
         self._is_new, self.is_automatic, self._waited = True, False, False
         self._asked_at_s = -_ASK_AGAIN_S
         self._return = SafeReturn()
+        self._counts.given = ()
         self._sent.clear()
         if kept := self._before.greet(str(welcome["session"])):
             self._plans.extend(kept.plans)
@@ -327,14 +329,22 @@ class ManagedDrone:
     @property
     def _wish(self) -> Wish:
         ahead, last = tuple(self._ahead), self.vehicle.last_node
-        return Wish(ahead, last, self._counts.go_on, self.flies, self.lands, self.docks)
+        counts = counts_of(self.vehicle.actions) if self._takes_counts else None
+        given = self._counts.given
+        return Wish(ahead, last, self._counts.go_on, self.flies, self.lands, self.docks, counts, given)
+
+    @property
+    def _takes_counts(self) -> bool:
+        """It is told what to count at each node; a daemon of before counts all that a node sees."""
+        return self.floor is not None and any(node.left is not None for node in self.floor.nodes)
 
     def _take_output(self, one: Output, status: StatusReport) -> None:
         match one:
             case Fly() | Hold():
                 pass  # what is ahead is known by the machine
             case Begin(action):
-                failed = self._counts.begin(action, self.vehicle.last_node, status, self._standing)
+                node, tells = self.vehicle.last_node, self._takes_counts
+                failed = self._counts.begin(action, node, status, self._standing, tells=tells)
                 self._asked.extend([failed] if failed is not None else [])
             case Abort(action_id):
                 self._counts.abort(action_id)
@@ -349,8 +359,6 @@ class ManagedDrone:
         self._trouble = None
         self.on_decided(one)
         if isinstance(one.about, Order):
-            if one.refusal is None:
-                self._order = one.about
             nodes = " ".join(n.node_id if n.released else f"({n.node_id})" for n in one.about.nodes)
             what = f"order {one.about.order_id}/{one.about.order_update_id}: {nodes}"
         else:
@@ -369,8 +377,9 @@ class ManagedDrone:
     def _reach(self, nodes: Sequence[Node]) -> int | None:
         if self._status is None or self._ways is None:
             return None
-        ids = [node.node_id for node in nodes]
-        return self._return.reach(ids, self.vehicle.last_node, self._status, self._ways, self._standing)
+        ids, last = [node.node_id for node in nodes], self.vehicle.last_node
+        counts = self._wish.counts_at(*ids)
+        return self._return.reach(ids, last, self._status, self._ways, self._standing, counts)
 
     def _go_on(self, status: StatusReport, now_s: float, tasks: asyncio.TaskGroup, link: DroneLink) -> None:
         """Begin what is to be done next, one thing after the other."""
@@ -432,7 +441,7 @@ class ManagedDrone:
     async def _do(self, act: PlanNext | CommandNext, status: StatusReport, link: DroneLink) -> None:
         act_id = f"{_OURS}{uuid.uuid4().hex}"
         if isinstance(act, PlanNext):
-            text, levels = "plan", levels_of(self._order, act.nodes)
+            text = "plan"
             self._plans.append(act_id)
         else:
             text = f"{act.kind} {act.node}".rstrip()
@@ -442,20 +451,24 @@ class ManagedDrone:
             if isinstance(act, PlanNext):
                 await link.plan_flight(
                     act.nodes,
-                    levels,
+                    (),
                     act_id,
                     session=status.session,
                     seen_ns=status.stamp_ns,
                     waits=status.waits_at is not None,
                     by_person=False,
+                    counts=act.counts,
                 )
-                self._planned, self._counts.levels = (act_id, act.nodes), levels
+                self._planned = act_id, act
+                self._counts.tell(act.counts, None, status.stamp_ns)
             else:
                 plan = self._planned[0] if act.kind is CommandKind.START and self._planned else ""
                 order = Act(
                     act_id, act.kind, act.node, plan, status.session, status.stamp_ns, act.waits, act.lands
                 )
-                await link.act(order, by_person=False)
+                await link.act(order, by_person=False, counts=act.counts)
+                if act.node:
+                    self._counts.tell(act.counts, {act.node}, status.stamp_ns)
             self._trouble = self._trouble if act == self._did[0] else None
         except FlightdError as err:
             refused = str(err).removeprefix("refused: ")

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from flightd.adapters.ground_link.messages.counts import Counts, NodeCount
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.types import CommandKind, Phase
 from flightd.mission.machine import FLYING
@@ -30,7 +31,8 @@ class Wish:
     """What an order wants by now: the nodes to be flown along, none to stay; the node that the drone is at or
     left last; whether something goes on there that a pause would interrupt; whether it is to be in the air,
     if only over its pad's node; whether it may come down there, and if on that node's pad rather than at
-    home."""
+    home.  `counts` is all that is to be counted at these nodes (None: that is not told to the drone), `given`
+    what it was told by now."""
 
     ahead: tuple[str, ...]
     last: str
@@ -38,23 +40,37 @@ class Wish:
     flies: bool = False
     lands: bool = False
     docks: bool = False
+    counts: Counts = None
+    given: tuple[NodeCount, ...] = ()
+
+    def counts_at(self, *nodes: str) -> Counts:
+        """What is to be counted at some of the nodes."""
+        return None if self.counts is None else tuple(one for one in self.counts if one.node in nodes)
+
+    def is_told(self, node: str) -> bool:
+        """Whether the drone counts at a node ahead what is to be counted there."""
+        wanted = self.counts_at(node)
+        return wanted is None or {*wanted} == {one for one in self.given if one.node == node}
 
 
 @dataclass(frozen=True, slots=True)
 class PlanNext:
-    """Hand these nodes over for the next flight."""
+    """Hand these nodes over for the next flight, and what is counted at them."""
 
     nodes: tuple[str, ...]
+    counts: Counts = None
 
 
 @dataclass(frozen=True, slots=True)
 class CommandNext:
-    """Give a command; `node` only with goto, and so is whether the drone `waits` there, or `lands`."""
+    """Give a command; `node` only with goto, and so is whether the drone `waits` there, or `lands`, and what
+    it counts there."""
 
     kind: CommandKind
     node: str = ""
     waits: bool = False
     lands: bool = False
+    counts: Counts = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +89,8 @@ def reached(status: StatusReport, wish: Wish) -> str | None:
     return status.goal if there and status.goal != wish.last and status.goal in wish.ahead else None
 
 
-def next_act(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, ...]] | None) -> Next:
-    """What is asked next; `planned` is the id and the nodes of the plan that was handed over last."""
+def next_act(status: StatusReport, wish: Wish, planned: tuple[str, PlanNext] | None) -> Next:
+    """What is asked next; `planned` is the plan that was handed over last, with its id."""
     if status.phase in WAITS:
         return _on_ground(status, wish, planned)
     if status.phase in FLYING and CommandKind.GOTO in status.possible and status.way:
@@ -82,15 +98,16 @@ def next_act(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, ..
     return None
 
 
-def _on_ground(status: StatusReport, wish: Wish, planned: tuple[str, tuple[str, ...]] | None) -> Next:
+def _on_ground(status: StatusReport, wish: Wish, planned: tuple[str, PlanNext] | None) -> Next:
     target = each_once(wish.ahead or ((wish.last,) if wish.works or wish.flies else ()))
     if not target:
         ours = planned is not None and status.plan == planned[0]
         return CommandNext(CommandKind.PAUSE) if ours and CommandKind.PAUSE in status.possible else None
     if CommandKind.PLAN not in status.possible:
         return None  # it starts already, or is not ready
-    if planned is None or status.plan != planned[0] or target != planned[1]:
-        return PlanNext(target)
+    plan = PlanNext(target, wish.counts_at(*target))
+    if planned is None or status.plan != planned[0] or plan != planned[1]:
+        return plan
     return CommandNext(CommandKind.START) if CommandKind.START in status.possible else None
 
 
@@ -108,8 +125,10 @@ def _in_air(status: StatusReport, wish: Wish) -> Next:
         return _off_way(status, wish, goal)
     ends = goal == wanted == status.waits_at
     waits = at_end and status.phase is Phase.HOLD
-    if (following != wanted and not ends) or (waits and wish.works):  # it is to be visited once more
-        return CommandNext(CommandKind.GOTO, wanted, waits=status.waits_at is not None)
+    anew = bool(wish.ahead) and not wish.is_told(wanted)
+    if (following != wanted and not ends) or (waits and wish.works) or anew:  # works: visited once more
+        is_led, counts = status.waits_at is not None, wish.counts_at(wanted)
+        return CommandNext(CommandKind.GOTO, wanted, waits=is_led, counts=counts)
     if wish.ahead or wish.works:
         return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD and not waits else None
     return CommandNext(CommandKind.PAUSE) if status.phase in AT_NODE and not ends else None
@@ -118,7 +137,7 @@ def _in_air(status: StatusReport, wish: Wish) -> Next:
 def _down(status: StatusReport, wish: Wish) -> Next:
     """Onto the pad of the node that it is at: home from there, where that is its own."""
     if status.waits_at or (wish.docks and status.lands_at != wish.last):
-        return CommandNext(CommandKind.GOTO, wish.last, lands=wish.docks)
+        return CommandNext(CommandKind.GOTO, wish.last, lands=wish.docks, counts=wish.counts_at(wish.last))
     return CommandNext(CommandKind.RESUME) if status.phase is Phase.HOLD else None
 
 

@@ -11,11 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flightd.adapters.ground_link.messages.answers import Planned
+from flightd.adapters.ground_link.messages.counts import Counts
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.errors import InputError
 from flightd.ground.drone_link import DroneLink
 from flightd.ground.mqtt.linked_floor import WaysHome
-from flightd.ground.mqtt.order_flight import WAITS, each_once
+from flightd.ground.mqtt.order_flight import WAITS, PlanNext, each_once
 
 _ANSWER_OLD_S = 30.0
 _BETWEEN_S = 0.3
@@ -45,8 +46,8 @@ class SafeReturn:
     """Answers at once by what is known; `ask` gets to know what is missing."""
 
     def __init__(self) -> None:
-        self._answers: dict[tuple[str, ...], tuple[int, float]] = {}
-        self._wanted: tuple[str, ...] = ()
+        self._answers: dict[PlanNext, tuple[int, float]] = {}
+        self._wanted = PlanNext(())
 
     def reach(
         self,
@@ -55,12 +56,13 @@ class SafeReturn:
         status: StatusReport,
         ways: WaysHome,
         standing: Standing | None,
+        counts: Counts = None,
     ) -> int | None:
-        """How many of the nodes; None while the drone has not answered."""
+        """How many of the nodes, at which this is counted; None while the drone has not answered."""
         if status.phase in WAITS:
-            self._wanted = each_once(nodes)
+            self._wanted = PlanNext(each_once(nodes), counts)
             known = self._answers.get(self._wanted)
-            full = known is not None and known[0] == len(self._wanted)
+            full = known is not None and known[0] == len(self._wanted.nodes)
             return len(nodes) if full else None if known is None else known[0]
         left_s = status.battery_left_s
         if left_s is None or standing is None:
@@ -71,29 +73,29 @@ class SafeReturn:
     def is_due(self, now_s: float) -> bool:
         """Whether the drone is to be asked."""
         known = self._answers.get(self._wanted)
-        return bool(self._wanted) and (known is None or now_s - known[1] > _ANSWER_OLD_S)
+        return bool(self._wanted.nodes) and (known is None or now_s - known[1] > _ANSWER_OLD_S)
 
     async def ask(self, link: DroneLink, now_s: float) -> None:
         """Ask the drone about the nodes that were wanted last.  As `DroneLink.plan_flight` raises where it
         does not answer."""
-        nodes = self._wanted
+        wanted, nodes = self._wanted, self._wanted.nodes
         fits, beyond = 0, len(nodes) + 1
         probe = len(nodes)
         while probe > fits:
-            if await _comes_home(link, nodes[:probe]):
+            if await _comes_home(link, nodes[:probe], wanted.counts):
                 fits = probe
             else:
                 beyond = probe
             probe = (fits + beyond) // 2
             if probe > fits:
                 await asyncio.sleep(_BETWEEN_S)
-        self._answers = {nodes: (fits, now_s)}
+        self._answers = {wanted: (fits, now_s)}
 
 
-async def _comes_home(link: DroneLink, nodes: Sequence[str]) -> bool:
+async def _comes_home(link: DroneLink, nodes: Sequence[str], counts: Counts) -> bool:
     """Whether the drone flies over the nodes and home on the battery that is in it."""
     try:
-        planned = await link.plan_flight(nodes, (), dry=True, waits=True, by_person=False)
+        planned = await link.plan_flight(nodes, (), dry=True, waits=True, by_person=False, counts=counts)
     except InputError:
         return False
     return planned.batteries <= 1

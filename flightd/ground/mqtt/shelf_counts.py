@@ -1,20 +1,20 @@
-"""The counts that an order asks for (scanShelf): the drone counts at the node where it stops, by its plan."""
+"""The counts that an order asks for (scanShelf): the drone counts at each node what it was told to there."""
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
+from flightd.adapters.ground_link.messages.counts import Counts, NodeCount
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import FlightdError
-from flightd.fleet.vda5050.order import Order
 from flightd.fleet.vda5050.parts import Action
 from flightd.fleet.vda5050.state import ActionStatus
 from flightd.fleet.vehicle.abilities import ScanShelf, scan_shelf_of
 from flightd.fleet.vehicle.signals import Progress
 from flightd.ground.drone_link import DroneLink
-from flightd.ground.mqtt.order_flight import WAITS
 from flightd.ground.mqtt.safe_return import Standing
 
 _MOST_VISITS = 32
@@ -22,12 +22,13 @@ _MOST_VISITS = 32
 
 @dataclass(slots=True)
 class _Count:
-    """One that goes on at the node where the drone is, since this time of the drone's clock."""
+    """One that goes on at the node where the drone is, since this time of the drone's clock (None: the drone
+    was not told to count it by then)."""
 
     action: Action
     scan: ScanShelf
     node: str
-    since_ns: int
+    since_ns: int | None
     held: bool = False
     seen: bool = False
     """The visit is over; what was counted is being asked for."""
@@ -39,8 +40,8 @@ class ShelfCounts:
     def __init__(self) -> None:
         self._counts: dict[str, _Count] = {}
         self._visits: deque[EventReport] = deque(maxlen=_MOST_VISITS)
-        self.levels: tuple[int, ...] = ()
-        """Those that are counted on this flight; none: all."""
+        self.given: tuple[NodeCount, ...] = ()
+        """What the drone was told to count on this flight."""
 
     @property
     def go_on(self) -> bool:
@@ -48,19 +49,25 @@ class ShelfCounts:
         return any(not count.held and not count.seen for count in self._counts.values())
 
     def begin(
-        self, action: Action, node: str, status: StatusReport, standing: Standing | None
+        self, action: Action, node: str, status: StatusReport, standing: Standing | None, *, tells: bool
     ) -> Progress | None:
-        """Begin one at `node`; what is to be told where it cannot be done."""
+        """Begin one at `node`; what is to be told where it cannot be done.  Not `tells`: the drone counts
+        all, and is told nothing."""
         scan = scan_shelf_of(action)
-        in_flight = status.phase not in WAITS
         if standing is not None and not standing.counts:
             return Progress(action.action_id, ActionStatus.FAILED, "this drone counts no shelves")
-        if in_flight and self.levels and not {*scan.levels} <= {*self.levels}:
-            levels = ", ".join(map(str, self.levels))
-            what = f"this flight began with level {levels} and counts no other"
-            return Progress(action.action_id, ActionStatus.FAILED, what)
-        self._counts[action.action_id] = _Count(action, scan, node, status.stamp_ns)
+        is_told = not tells or count_of(node, scan) in self.given
+        since_ns = status.stamp_ns if is_told else None
+        self._counts[action.action_id] = _Count(action, scan, node, since_ns)
         return None
+
+    def tell(self, counts: Counts, nodes: Collection[str] | None, stamp_ns: int) -> None:
+        """The drone took this, all that it is to count at `nodes` (None: on its whole flight), by then."""
+        kept = () if nodes is None else (one for one in self.given if one.node not in nodes)
+        self.given = (*kept, *(counts or ()))
+        for count in self._counts.values():
+            if count.since_ns is None and count_of(count.node, count.scan) in self.given:
+                count.since_ns = stamp_ns
 
     def abort(self, action_id: str) -> None:
         """It is left off: the drone counts on, nobody waits for it."""
@@ -79,8 +86,9 @@ class ShelfCounts:
         """The ids of those that are over and were not asked for before."""
         found = []
         for action_id, count in self._counts.items():
+            since_ns = math.inf if count.since_ns is None else count.since_ns
             visits = (one for one in self._visits if one.text == count.node)
-            if not count.seen and any(one.stamp_ns > count.since_ns for one in visits):
+            if not count.seen and any(one.stamp_ns > since_ns for one in visits):
                 count.seen = True
                 found.append(action_id)
         return found
@@ -95,30 +103,36 @@ class ShelfCounts:
         for action_id in over:
             count = self._counts.pop(action_id, None)
             if count is not None:
-                result = counted_in_words(rows, count.node, count.scan.expected)
+                result = counted_in_words(rows, count.node, count.scan)
                 told.append(Progress(action_id, ActionStatus.FINISHED, result))
         return told
 
 
-def levels_of(order: Order | None, nodes: Iterable[str]) -> tuple[int, ...]:
-    """The levels that all counts of an order ask for, where one of them is at these nodes; none: all."""
-    scans = {
-        (node.node_id, tuple(sorted(scan_shelf_of(action).levels)))
-        for node in (order.nodes if order else ())
-        for action in node.actions
-    }
-    levels = {levels for _, levels in scans}
-    return next(iter(levels)) if len(levels) == 1 and {node for node, _ in scans} & {*nodes} else ()
+def counts_of(actions: Mapping[str, Iterable[Action]]) -> tuple[NodeCount, ...]:
+    """All that the actions at these nodes ask to be counted."""
+    found = [count_of(node, scan_shelf_of(action)) for node, here in actions.items() for action in here]
+    return tuple(dict.fromkeys(found))
 
 
-def counted_in_words(
-    rows: Iterable[dict[str, str]], node: str, expected: tuple[str, ...] | None
-) -> str | None:
-    """What was counted at a node, for a scanShelf's result; None where the drone tells nothing."""
-    here = [row for row in rows if row.get("node") == node]
+def count_of(node: str, scan: ScanShelf) -> NodeCount:
+    """What is to be counted at a node, as the drone is told."""
+    return NodeCount(node, "" if scan.side is None else scan.side.value, tuple(sorted(scan.levels)))
+
+
+def counted_in_words(rows: Iterable[dict[str, str]], node: str, scan: ScanShelf) -> str | None:
+    """What was counted at a node of what is asked for, for a scanShelf's result; None where the drone tells
+    nothing."""
+    here = [row for row in rows if row.get("node") == node and _is_asked(row, scan)]
     if not here:
         return None
     read = [row["texts"] for row in here if row.get("texts")]
     told = f"{len(read)} of {len(here)} places with codes"
-    missing = [code for code in expected or () if not any(code in text.split(" ") for text in read)]
+    missing = [code for code in scan.expected or () if not any(code in text.split(" ") for text in read)]
     return f"{told}; not read: {', '.join(missing)}" if missing else told
+
+
+def _is_asked(row: dict[str, str], scan: ScanShelf) -> bool:
+    """Whether a row is of the scan's places; a daemon of before tells no side and no level."""
+    side, level = row.get("side"), row.get("level")
+    on_side = scan.side is None or side is None or side == scan.side
+    return on_side and (not scan.levels or level is None or level in map(str, scan.levels))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from flightd.config.battery import BatteryConfig
 from flightd.config.schema import Config
+from flightd.core.count_choice import CountChoice
 from flightd.core.errors import InputError
 from flightd.mission.battery.consumption import BatteryGauge
 from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy
@@ -48,8 +49,8 @@ class WayBack:
 class Sorties:
     """The battery against the ways of one site.  `step` at each tick; the rest answers questions.
 
-    With a `scanner` a stop lasts as long as what it has left to count there; with `levels` as long as what
-    hangs on these, whether or not it is counted already, in passing or only `by_stopping`."""
+    With a `scanner` a stop lasts as long as what it has left to count there; with a `choice` as long as
+    what it takes, whether or not it is counted already, in passing or only `by_stopping`."""
 
     def __init__(
         self,
@@ -57,11 +58,11 @@ class Sorties:
         legs: Legs,
         battery: BatteryConfig,
         scanner: AnyScanner = NO_SCAN,
-        levels: Sequence[int] | None = None,
+        choice: CountChoice | None = None,
         *,
         by_stopping: bool = False,
     ) -> None:
-        self._levels = levels
+        self._choice = choice
         self._by_stopping = by_stopping
         self._site = site
         self._legs = legs
@@ -159,7 +160,7 @@ class Sorties:
     def stop_s(self, node: str) -> float:
         """Seconds of the stop at a node."""
         pace = self._legs.pace
-        counted_s = self._scanner.stop_s(node, pace, self._levels, by_stopping=self._by_stopping)
+        counted_s = self._scanner.stop_s(node, pace, self._choice, by_stopping=self._by_stopping)
         return counted_s or pace.dwell_s
 
     def _out_s(self, on_s: float, there: str) -> float:

@@ -231,10 +231,10 @@ class Itinerary:
 
     def go_to(
         self, now_ns: int, node: str, *, waits: bool = False, lands: bool = False, halted: bool = False
-    ) -> None:
+    ) -> bool:
         """Fly over `node` home, as ordered, or hold there (`waits`), or land on the pad there (`lands`): an
-        order to fly home from where it would hold flies home.  One that cannot be followed changes nothing.
-        `halted`: it begins its leg anew."""
+        order to fly home from where it would hold flies home.  False for one that cannot be followed: it
+        changes nothing.  `halted`: it begins its leg anew."""
         if node not in self._site.nodes:
             why = f"no node {node!r} on site {self._site.name}"
         else:
@@ -249,8 +249,9 @@ class Itinerary:
             else:
                 self._waits, self._told_pad = waits, node if lands else ""
                 self._next += holds and halted  # it is there already
-                return
+                return True
         self._events.report(now_ns, EventLevel.WARNING, "command", why)
+        return False
 
     def leads_on_from(self, pose: GridPose | None) -> bool:
         """Whether open lines lead to the goal from where the drone turned out to be."""

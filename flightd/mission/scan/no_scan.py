@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
+from flightd.core.count_choice import ALL, CountChoice
 from flightd.core.planned_flight import PlannedSweep
 from flightd.core.scanning import BodyPose, CodeSet, CountedPlace, Finding, Place, Settled
 from flightd.core.types import Event
@@ -37,16 +38,19 @@ class NoScan:
         self,
         _node: str,
         _pace: Pace,
-        _levels: Sequence[int] | None = None,
+        _choice: CountChoice | None = None,
         *,
         by_stopping: bool = False,  # noqa: ARG002 - named by who asks
     ) -> float:
         return 0.0
 
-    def places_at(self, _node: str, _levels: Sequence[int] = ()) -> frozenset[str]:
+    def places_at(self, _node: str, _choice: CountChoice = ALL) -> frozenset[str]:
         return frozenset()
 
-    def choose(self, levels: Sequence[int], *, by_stopping: bool = False) -> None:
+    def choose(self, choice: CountChoice, *, by_stopping: bool = False) -> None:
+        """Nothing is counted anyway."""
+
+    def choose_at(self, node: str, choice: CountChoice) -> None:
         """Nothing is counted anyway."""
 
     def count_anew(self) -> None:
@@ -71,7 +75,7 @@ class NoScan:
         """Nothing is left."""
 
     def told_sweeps(
-        self, _runs: Iterable[Sequence[str]], _levels: Sequence[int] = ()
+        self, _runs: Iterable[Sequence[str]], _choice: CountChoice = ALL
     ) -> tuple[PlannedSweep, ...]:
         return ()
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from flightd.config.scan import ScanConfig
+from flightd.core.count_choice import ALL, CountChoice
 from flightd.core.planned_flight import PlannedSweep
 from flightd.core.scanning import BodyPose, CodeSet, CountedPlace, Finding, PictureWorth, Place, Settled
 from flightd.core.types import Event, EventLevel
@@ -70,7 +71,6 @@ class Scanner:
         self._owners = CodeOwners()
         self._aisle_of = {node.id: node.aisle for node in site.nodes.values()}
         self._planned = self._wanted = frozenset(site.locations)
-        self._levels = {location.code: location.level for location in site.locations.values()}
         self._done: set[str] = set()
         self._task: ScanTask | None = None
         self._pending = PendingFindings(params.confirm_stops, params.expert.revisits)
@@ -126,33 +126,34 @@ class Scanner:
         return not self.doubted and bool(self._left(node))
 
     def stop_s(
-        self, node: str, pace: Pace, levels: Sequence[int] | None = None, *, by_stopping: bool = False
+        self, node: str, pace: Pace, choice: CountChoice | None = None, *, by_stopping: bool = False
     ) -> float:
-        """How long the count of what is left at a node takes, each view looked from once; with `levels` that
-        of what hangs on these (empty: on any), counted already or not, in passing or only `by_stopping`.  0
-        where nothing is to be counted."""
-        if levels is None:
+        """How long the count of what is left at a node takes, each view looked from once; with a `choice`
+        that of what it takes, counted already or not, in passing or only `by_stopping`.  0 where nothing is
+        to be counted."""
+        if choice is None:
             if not self.wants(node):
                 return 0.0
             by_stopping = self._by_stopping
-        swept_s = 0.0 if by_stopping else self._passed_s(node, pace, levels)
+        swept_s = 0.0 if by_stopping else self._passed_s(node, pace, choice)
         if swept_s:
             return swept_s
-        places = self._left(node) if levels is None else self.places_at(node, levels)
+        places = self._left(node) if choice is None else self.places_at(node, choice)
         views = self._planner.views(node, places, pace.height_m, 0.0) if places else ()
         return views_s(views, pace, self._params.view_s) if views else 0.0
 
-    def places_at(self, node: str, levels: Sequence[int] = ()) -> frozenset[str]:
-        """The locations that are counted from a node, on all levels or only on these."""
-        found = frozenset(self._planner.locations(node))
-        return frozenset(code for code in found if self._levels[code] in levels) if levels else found
+    def places_at(self, node: str, choice: CountChoice = ALL) -> frozenset[str]:
+        """The locations that are counted from a node, as far as the choice takes them."""
+        return self._chosen(self._planner.locations(node), choice.at(node))
 
-    def choose(self, levels: Sequence[int], *, by_stopping: bool = False) -> None:
-        """Count only what hangs on these levels; on all of them where there are none.  `by_stopping`: nothing
-        in passing, which chooses its way itself."""
+    def choose(self, choice: CountChoice, *, by_stopping: bool = False) -> None:
+        """Count only what it takes.  `by_stopping`: nothing in passing, which chooses its way itself."""
         self._by_stopping = by_stopping
-        among = self._planned
-        self._wanted = frozenset(code for code in among if self._levels[code] in levels) if levels else among
+        self._wanted = frozenset(code for node in self._aisle_of for code in self.places_at(node, choice))
+
+    def choose_at(self, node: str, choice: CountChoice) -> None:
+        """Count at one node only what it takes, and elsewhere what was chosen before."""
+        self._wanted = self._wanted - self.places_at(node) | self.places_at(node, choice)
 
     def go_on_with(self, counted: Iterable[CountedPlace]) -> None:
         """Earlier flights of the same count have booked these: they need no look unless a code of theirs is
@@ -270,16 +271,16 @@ class Scanner:
         return self._sweeps is not None
 
     def told_sweeps(
-        self, runs: Iterable[Sequence[str]], levels: Sequence[int] = ()
+        self, runs: Iterable[Sequence[str]], choice: CountChoice = ALL
     ) -> tuple[PlannedSweep, ...]:
         """How what hangs at the nodes of `runs`, each in one aisle and begun at its first node, is flown past
-        on all levels or these, and why where it is not; empty where nothing ever is."""
+        as far as the choice takes it, and why where it is not; empty where nothing ever is."""
         if self._sweeps is None:
             return ()
         lanes: list[JudgedLane] = []
         before: frozenset[str] = frozenset()
         for run in runs:
-            codes = frozenset(code for node in run for code in self.places_at(node, levels)) - before
+            codes = frozenset(code for node in run for code in self.places_at(node, choice)) - before
             lanes += self._sweeps.judged(run, codes, 0.0, 0.0)
             before |= codes
         return told(lanes)
@@ -507,16 +508,19 @@ class Scanner:
         self._events.append(Event(found.stamp_ns, EventLevel.WARNING, "contradiction", str(against)))
         return against.again
 
-    def _passed_s(self, node: str, pace: Pace, levels: Sequence[int] | None) -> float:
+    def _passed_s(self, node: str, pace: Pace, choice: CountChoice | None) -> float:
         """A node's share of the time in which its aisle is counted in passing; 0 where it is not."""
         if self._passing_time is None:
             return 0.0
         aisle = self._aisle_of[node]
         nodes = [other for other, of in self._aisle_of.items() if of == aisle]
         left = {code for other in nodes for code in self._left(other)} - self._swept
-        if levels:
-            left = {code for code in left if self._levels[code] in levels}
-        return self._passing_time.share_s(node, nodes, frozenset(left), pace)
+        chosen = frozenset(left) if choice is None else self._chosen(left, choice)
+        return self._passing_time.share_s(node, nodes, chosen, pace)
+
+    def _chosen(self, codes: Iterable[str], choice: CountChoice) -> frozenset[str]:
+        places = map(self._site.locations.__getitem__, codes)
+        return frozenset(at.code for at in places if choice.takes(at.node, at.side, at.level))
 
 
 def _faces(leg: SweepLeg) -> list[Face]:

@@ -65,8 +65,17 @@ def floor_of(site: Site) -> Floor:
             ways.add((edge.a, edge.b))
             if not edge.one_way:
                 ways.add((edge.b, edge.a))
-    sides = {aisle.id: frozenset(aisle.shelves) for aisle in site.aisles}
-    shelves = {node.id: sides[node.aisle] for node in site.nodes.values()}
+    sides = {aisle.id: aisle.shelves for aisle in site.aisles}
+    places = {(place.node, place.side, place.level) for place in site.locations.values()}
+    shelves = {
+        node.id: {
+            side: frozenset(level for at, on, level in places if (at, on) == (node.id, side))
+            if places
+            else None
+            for side in sides[node.aisle]
+        }
+        for node in site.nodes.values()
+    }
     return Floor(site.name, frozenset(site.nodes), frozenset(ways), shelves)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from flightd.core.errors import InputError
 from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.fleet.vda5050.codec import Version
 from flightd.fleet.vda5050.state import OperatingMode
+from flightd.fleet.vehicle.abilities import ScanShelf
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.messages import LinkState
 from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
@@ -25,6 +27,7 @@ from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
 from flightd.ground.mqtt.sent_commands import SentCommands
 from flightd.ground.mqtt.shelf_counts import counted_in_words
+from flightd.site.site import Side
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
 from tests.unit.fleet.vehicle_rig import floor_of, order
@@ -78,7 +81,7 @@ def test_a_drone_in_the_air_is_sent_on_before_it_turns_home(
 ) -> None:
     possible = () if phase is Phase.LAND else IN_AIR
     told = status(phase, way, possible=possible)
-    assert next_act(told, Wish(nodes(ahead), last), ("p", ())) == asked
+    assert next_act(told, Wish(nodes(ahead), last), ("p", PlanNext(()))) == asked
 
 
 WAITS = [
@@ -101,7 +104,7 @@ def test_a_drone_that_waits_at_the_end_of_its_way_is_sent_on_from_there_however_
     phase: Phase, way: str, waits_at: str, ahead: str, last: str, asked: Next
 ) -> None:
     told = status(phase, way, waits_at=waits_at)
-    assert next_act(told, Wish(nodes(ahead), last), ("p", ())) == asked
+    assert next_act(told, Wish(nodes(ahead), last), ("p", PlanNext(()))) == asked
 
 
 def test_a_drone_that_waits_counts_once_more_where_it_is_and_lands_where_it_may() -> None:
@@ -134,13 +137,13 @@ def test_on_the_ground_the_base_is_planned_and_then_started() -> None:
     wish = Wish(("A2", "A3", "A2"), "A1")
     stands = status(Phase.PREFLIGHT)
     assert next_act(stands, wish, None) == PlanNext(("A2", "A3")), "a plan visits each node once"
-    assert next_act(stands, wish, ("p", ("A2",))) == PlanNext(("A2", "A3"))
-    assert next_act(stands, wish, ("p", ("A2", "A3"))) == CommandNext(CommandKind.START)
+    assert next_act(stands, wish, ("p", PlanNext(("A2",)))) == PlanNext(("A2", "A3"))
+    assert next_act(stands, wish, ("p", PlanNext(("A2", "A3")))) == CommandNext(CommandKind.START)
     held = status(Phase.PREFLIGHT, possible=(CommandKind.PLAN,))
-    assert next_act(held, wish, ("p", ("A2", "A3"))) is None, "it is not ready"
+    assert next_act(held, wish, ("p", PlanNext(("A2", "A3")))) is None, "it is not ready"
     starts = status(Phase.ARMING, possible=(PAUSE,))
-    assert next_act(starts, Wish((), "A1"), ("p", ("A2", "A3"))) == CommandNext(PAUSE)
-    assert next_act(starts, Wish((), "A1"), ("other", ())) is None
+    assert next_act(starts, Wish((), "A1"), ("p", PlanNext(("A2", "A3")))) == CommandNext(PAUSE)
+    assert next_act(starts, Wish((), "A1"), ("other", PlanNext(()))) is None
 
 
 def test_a_node_is_reached_once() -> None:
@@ -327,6 +330,18 @@ def test_a_count_is_told_in_words() -> None:
         {"node": "A2", "texts": ""},
         {"node": "A3", "texts": "X"},
     ]
-    assert counted_in_words(rows, "A2", None) == "1 of 2 places with codes"
-    assert counted_in_words(rows, "A2", ("PALLET-1", "X")) == "1 of 2 places with codes; not read: X"
-    assert counted_in_words(rows, "B1", ("X",)) is None
+    expects = ScanShelf(expected=("PALLET-1", "X"))
+    assert counted_in_words(rows, "A2", ScanShelf()) == "1 of 2 places with codes"
+    assert counted_in_words(rows, "A2", expects) == "1 of 2 places with codes; not read: X"
+    assert counted_in_words(rows, "B1", expects) is None
+    assert counted_in_words(rows, "A2", ScanShelf((1,), Side.LEFT)) == "1 of 2 places with codes", "not told"
+
+
+def test_a_count_tells_only_of_the_side_and_levels_that_were_asked_for() -> None:
+    places = itertools.product(("left", "right"), "12")
+    rows = [{"node": "A2", "side": side, "level": level, "texts": side + level} for side, level in places]
+    assert counted_in_words(rows, "A2", ScanShelf()) == "4 of 4 places with codes"
+    assert counted_in_words(rows, "A2", ScanShelf((), Side.LEFT)) == "2 of 2 places with codes"
+    assert counted_in_words(rows, "A2", ScanShelf((2,))) == "2 of 2 places with codes"
+    one = ScanShelf((1,), Side.RIGHT, ("right1", "left1"))
+    assert counted_in_words(rows, "A2", one) == "1 of 1 places with codes; not read: left1"

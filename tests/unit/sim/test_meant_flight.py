@@ -10,6 +10,7 @@ from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.app.simulation.meant_flight import MeantFlight, meant_flight
 from flightd.app.simulation.prepare import SimOptions, prepare
 from flightd.app.simulation.simulation import Simulation
+from flightd.core.count_choice import ALL
 from flightd.core.topics import Topic
 from flightd.core.types import Command, CommandKind, Event, EventLevel
 from flightd.replay.log import read_log
@@ -45,7 +46,7 @@ def refused(at_s: int) -> Event:
 
 def test_without_an_order_it_is_what_the_configuration_says(simulation: Simulation) -> None:
     told = meant(simulation, (Command("12345678", CommandKind.START), taken(1)))
-    assert (told.plan, told.levels) == (simulation.plan(), ())
+    assert (told.plan, told.choice) == (simulation.plan(), ALL)
 
 
 def test_the_last_plan_that_was_taken_is_meant_in_its_order(simulation: Simulation) -> None:
@@ -53,9 +54,9 @@ def test_the_last_plan_that_was_taken_is_meant_in_its_order(simulation: Simulati
     told = meant(simulation, first, last, (chosen("B1"), refused(3)))
     assert [stop.node for stop in told.plan.stops if stop.visit] == ["A3", "A2"]
     assert told.nodes == {"A2", "A3"}
-    assert told.levels == (2,)
+    assert told.choice.levels == (2,)
 
 
 def test_an_order_of_no_nodes_goes_back_to_the_configuration(simulation: Simulation) -> None:
     told = meant(simulation, (chosen("A2", levels=(1,)), taken(1)), (chosen(), taken(2)))
-    assert (told.plan, told.levels) == (simulation.plan(), ())
+    assert (told.plan, told.choice) == (simulation.plan(), ALL)

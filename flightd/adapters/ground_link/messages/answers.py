@@ -9,6 +9,7 @@ import msgspec
 from msgspec import Meta
 
 from flightd.adapters.ground_link.messages.base import DaemonAnswer, Role, Session
+from flightd.adapters.ground_link.messages.counts import Counts
 from flightd.adapters.ground_link.messages.floor import CameraOptics, FloorStatus
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.preview import CameraName
@@ -107,6 +108,10 @@ class PlanAnswer(DaemonAnswer, frozen=True, tag="plan"):
     levels: Annotated[tuple[int, ...], Meta(description="shelf levels that are counted; none: all")]
     visited: Annotated[tuple[str, ...], Meta(description="visited so far, in order")]
     remaining: Annotated[tuple[str, ...], Meta(description="still to be visited, in order")]
+    counts: Annotated[
+        Counts,
+        Meta(description="only this is counted at its nodes; null: by `levels`"),
+    ] = None
 
 
 class Code(enum.StrEnum):

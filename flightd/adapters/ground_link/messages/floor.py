@@ -18,6 +18,13 @@ class FloorNode(msgspec.Struct, frozen=True):
     y_m: Annotated[float, Meta(description="m to the right of x")]
     aisle: Annotated[str, Meta(description="of which aisle")] = ""
     levels: Annotated[tuple[int, ...], Meta(description="shelf levels with locations that it faces")] = ()
+    left: Annotated[
+        tuple[int, ...] | None,
+        Meta(description="of these on its left, towards -y; null: a daemon that takes no `counts`"),
+    ] = None
+    right: Annotated[tuple[int, ...] | None, Meta(description="of these on its right; null: as `left`")] = (
+        None
+    )
 
 
 class FloorLine(msgspec.Struct, frozen=True):

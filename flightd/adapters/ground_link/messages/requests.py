@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from flightd.adapters.ground_link.messages.base import ClientRequest
+from flightd.adapters.ground_link.messages.counts import Counts
 from flightd.core.planned_flight import MOST_NODES
 from flightd.core.preview import CameraName
 from flightd.core.types import CommandKind
@@ -53,6 +54,13 @@ class Order(ClientRequest, frozen=True, tag="command", omit_defaults=True):
         bool,
         Meta(description="only with goto: land on the pad of that node, and wait there for another flight"),
     ] = False
+    counts: Annotated[
+        Counts,
+        Meta(
+            description="only with goto: of all that its node sees only this is counted; null: as the plan's "
+            "levels say"
+        ),
+    ] = None
 
 
 class PlanFlight(ClientRequest, frozen=True, tag="plan_flight", omit_defaults=True):
@@ -68,6 +76,13 @@ class PlanFlight(ClientRequest, frozen=True, tag="plan_flight", omit_defaults=Tr
         tuple[Annotated[int, Meta(ge=1, le=99)], ...],
         Meta(max_length=99, description="shelf levels that are counted there; none: all"),
     ] = ()
+    counts: Annotated[
+        Counts,
+        Meta(
+            description="of all that the nodes see only this is counted, whatever `levels` says, and nothing "
+            "at a node that is not named; null: by `levels`"
+        ),
+    ] = None
     best_order: Annotated[
         bool, Meta(description="in the quickest order (many nodes: aisle by aisle), not as listed")
     ] = False
