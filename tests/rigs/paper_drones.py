@@ -137,7 +137,7 @@ class PaperDrone:
     def flies(self) -> bool:
         return self.phase in _LASTS_S or self.phase in {Phase.FOLLOW, Phase.HOLD, Phase.RELOCATE}
 
-    async def act(self, act: Act, *, by_person: bool = True) -> Accepted:
+    async def act(self, act: Act, *, by_person: bool = True, **_: Any) -> Accepted:
         if by_person:
             self.on_person()
         if act.command in self.refuses:

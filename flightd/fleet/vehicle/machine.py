@@ -147,8 +147,8 @@ class Vehicle:
 
     @property
     def actions(self) -> dict[str, tuple[Action, ...]]:
-        """The order's actions at each node of the base when the drone comes there next; where some are not over
-        at the node that it is at, these."""
+        """The order's actions at each node of the base when the drone comes there next; where some are not
+        over at the node that it is at, these."""
         found = {node.node_id: tuple(node.actions) for node in reversed(self._route.base)}
         return found | ({self.last_node: self._actions.due} if self._actions.due else {})
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from flightd.config.schema import Config, load_config
 from flightd.config.sweep import ScanMode
+from flightd.core.count_choice import ShelfCount
 from flightd.core.flight_order import ChosenPlan
 from flightd.core.planned_flight import PlannedFlight
 from flightd.core.topics import Topic
@@ -20,24 +21,35 @@ CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_va
 ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE}
 
 
-def flown(*nodes: str, levels: tuple[int, ...] = (), config: Config = CONFIG) -> tuple[Flown, PlannedFlight]:
-    """The flight of a plan that comes once the drone is ready, and what was said of it before."""
+def flown(
+    *nodes: str,
+    levels: tuple[int, ...] = (),
+    counts: tuple[ShelfCount, ...] | None = None,
+    then: Command | None = None,
+    config: Config = CONFIG,
+) -> tuple[Flown, PlannedFlight]:
+    """The flight of a plan that comes once the drone is ready, and what was said of it before; `then` is
+    ordered once it is at its first node."""
     stock = Stock({code: [Label(f"PALLET {code}", 0.1, 0.1)] for code in SITE.locations})
     flight = IdealFlight(SITE, config, front=IdealFront(SITE, SIGHT, stock))
     mission = flight.pilot.mission
     said: list[PlannedFlight] = []
     kept: list[object] = []
 
-    def order(_phase: Phase, _now_ns: int) -> None:
+    later = [] if then is None else [then]
+
+    def order(phase: Phase, _now_ns: int) -> None:
+        if phase is Phase.HOVER and later:
+            flight.commands.append(later.pop())
         if not said and CommandKind.START in mission.possible_commands:
-            said.append(mission.planned(nodes, levels, best_order=False))
-            plan = Command("plan-0001", CommandKind.PLAN, nodes=nodes, levels=levels)
+            said.append(mission.planned(nodes, levels, best_order=False, counts=counts))
+            plan = Command("plan-0001", CommandKind.PLAN, nodes=nodes, levels=levels, counts=counts)
             flight.commands += [plan, Command("start-001", CommandKind.START, plan="plan-0001")]
 
     flight.on_tick = order
     flight.on_record = lambda topic, _ns, message: kept.append(message) if topic == Topic.PLAN else None
     done = flight.fly()
-    assert kept == [ChosenPlan("plan-0001", nodes, levels)]
+    assert kept == [ChosenPlan("plan-0001", nodes, levels, counts)]
     return done, said[0]
 
 
@@ -52,6 +64,35 @@ def test_it_counts_the_chosen_level_of_the_chosen_nodes_in_about_the_time_that_w
     assert said.places == len(wanted)
     air_s = 0.02 * sum(output.phase not in ON_GROUND for output in flight.outputs)
     assert 0.9 < said.seconds / air_s < 1.4, "a view is often over before its longest"
+
+
+def counted(flight: Flown) -> set[str]:
+    return {finding.location for output in flight.outputs for finding in output.findings}
+
+
+def of(*counts: ShelfCount) -> set[str]:
+    places = SITE.locations.values()
+    return {at.code for at in places if any(one.takes(at.node, at.side, at.level) for one in counts)}
+
+
+def test_it_counts_at_each_node_the_side_and_levels_that_are_told_for_it_alone() -> None:
+    low, right = ShelfCount("A2", "left", (1,)), ShelfCount("A3", "right")
+    flight, said = flown("A2", "A3", "A4", counts=(low, right))
+    assert (flight.phase, flight.visited) == (Phase.DONE, ["A2", "A3", "A4"])
+    assert counted(flight) == of(low, right)
+    assert said.places == len(of(low, right))
+
+
+def test_a_goto_says_what_is_counted_at_its_node_whatever_the_plan_says() -> None:
+    low, other = ShelfCount("A2", "left", (1,)), ShelfCount("A3", "left")
+    told = Command("goto-0001", CommandKind.GOTO, node="A4", counts=(ShelfCount("A4", "right", (2,)),))
+    flight, _ = flown("A2", "A3", counts=(low, other), then=told)
+    assert counted(flight) == of(low, ShelfCount("A4", "right", (2,)))
+
+
+def test_a_goto_that_says_nothing_of_it_has_all_counted_there() -> None:
+    flight, _ = flown("A2", counts=(), then=Command("goto-0001", CommandKind.GOTO, node="A4"))
+    assert counted(flight) == of(ShelfCount("A4"))
 
 
 def test_in_passing_it_takes_about_the_time_that_was_said_too() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import msgspec
 import pytest
 
 from flightd.adapters.ground_link.floor_status import floor_status
+from flightd.adapters.ground_link.messages.counts import NodeCount
 from flightd.adapters.ground_link.messages.floor import FloorWay
 from flightd.adapters.ground_link.messages.published import EventReport, LinkReport, Position, StatusReport
 from flightd.core.errors import InputError
@@ -30,10 +32,11 @@ from flightd.ground.mqtt.shelf_counts import counted_in_words
 from flightd.site.site import Side
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
-from tests.unit.fleet.vehicle_rig import floor_of, order
+from tests.unit.fleet.vehicle_rig import floor_of, order, scan
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
+RACKS = load_site(CONFIGS / "site-racks-small.toml")
 IN_AIR = (CommandKind.PAUSE, CommandKind.RESUME, CommandKind.GOTO, CommandKind.HOME)
 GOTO, PAUSE, RESUME = CommandKind.GOTO, CommandKind.PAUSE, CommandKind.RESUME
 
@@ -44,10 +47,10 @@ def status(phase: Phase, way: str = "", **more: Any) -> StatusReport:
     waits = phase is Phase.PREFLIGHT
     possible = (CommandKind.PLAN, CommandKind.START) if waits else IN_AIR
     return StatusReport(
-        version=1, session="s", seq=1, stamp_ns=1, phase=phase, reason="", node="", goal=(nodes or ("",))[0],
+        version=1, session="s", phase=phase, reason="", node="", goal=(nodes or ("",))[0],
         nodes_done=0, nodes_planned=0, height_m=None, lines=(), lines_age_s=None, vehicle=None,
         frames=0, frames_dropped=0, fps=0.0, latency_ms={}, link=LinkReport(0, 0, 0, 0, 0), way=nodes,
-        **{"possible": possible, "plan": "p", "position": None, **more},
+        **{"seq": 1, "stamp_ns": 1, "possible": possible, "plan": "p", "position": None, **more},
     )  # fmt: skip
 
 
@@ -144,6 +147,25 @@ def test_on_the_ground_the_base_is_planned_and_then_started() -> None:
     starts = status(Phase.ARMING, possible=(PAUSE,))
     assert next_act(starts, Wish((), "A1"), ("p", PlanNext(("A2", "A3")))) == CommandNext(PAUSE)
     assert next_act(starts, Wish((), "A1"), ("other", PlanNext(()))) is None
+
+
+def test_a_drone_is_told_what_it_counts_at_each_node_and_told_again_where_that_changes() -> None:
+    left, right, low = NodeCount("A2", "left"), NodeCount("A2", "right", (1,)), NodeCount("A3", "", (2,))
+    wish = Wish(("A2", "A3"), "A1", counts=(left, low))
+    plan = PlanNext(("A2", "A3"), (left, low))
+    stands, flies = status(Phase.PREFLIGHT), status(Phase.FOLLOW, "A2 A3 A3 A1", waits_at="A3")
+    assert next_act(stands, wish, ("p", PlanNext(("A2", "A3"), (right, low)))) == plan
+    assert next_act(stands, wish, ("p", plan)) == CommandNext(CommandKind.START)
+    there = replace(wish, given=(low, left))
+    assert next_act(flies, there, None) is None
+    more = CommandNext(GOTO, "A4", waits=True, counts=())
+    ends = status(Phase.FOLLOW, "A3 A3 A1", waits_at="A3")
+    assert next_act(ends, replace(there, ahead=("A3", "A4"), last="A2"), None) == more, "nothing is counted"
+    holds = status(Phase.HOLD, "A1 A2 A2 A1", waits_at="A2")
+    other = Wish(("A2",), "A1", counts=(right,), given=(left,))
+    assert next_act(holds, other, None) == CommandNext(GOTO, "A2", waits=True, counts=(right,))
+    assert next_act(holds, replace(other, given=(right,)), None) == CommandNext(RESUME)
+    assert next_act(holds, replace(other, counts=None), None) == CommandNext(RESUME), "a daemon of before"
 
 
 def test_a_node_is_reached_once() -> None:
@@ -254,16 +276,69 @@ class Link:
 
     def __init__(self) -> None:
         self.asked: list[str] = []
+        self.counts: list[Any] = []
 
     async def plan_flight(
-        self, asked: tuple[str, ...], *_: Any, dry: bool = False, waits: bool = False, **__: Any
+        self,
+        asked: tuple[str, ...],
+        *_: Any,
+        dry: bool = False,
+        waits: bool = False,
+        counts: Any = None,
+        **__: Any,
     ) -> Any:
+        self.counts.append(counts)
         self.asked += [] if dry else [f"plan {' '.join(asked)}{', to wait there' * waits}"]
-        told = {"batteries": 1, "way": ("A1", "A2"), "places": 0, "sweeps": (), "seconds": 9.0, "way_m": 9.0}
+        told = {"batteries": 1, "way": ("A1", "A2"), "places": 1, "sweeps": (), "seconds": 9.0, "way_m": 9.0}
         return type("Planned", (), told)
 
-    async def act(self, act: Any, **_: Any) -> None:
+    async def act(self, act: Any, *, counts: Any = None, **_: Any) -> None:
         self.asked.append(act.command.value)
+        self.counts.append(counts)
+
+    async def inventory(self) -> tuple[dict[str, str], ...]:
+        return ()
+
+
+@pytest.mark.parametrize("knows", [True, False])
+def test_what_an_order_asks_to_be_counted_goes_to_the_drone_node_by_node(knows: bool) -> None:
+    drone = ManagedDrone("demo", Version.V3_0, Measures(3, 1, 1, 1, 1, 1), OrderRules(60, lambda *_: None))
+    link, floor = Link(), floor_status(RACKS)
+    if not knows:
+        before = tuple(msgspec.structs.replace(node, left=None, right=None) for node in floor.nodes)
+        floor = msgspec.structs.replace(floor, nodes=before)
+
+    def tell(phase: Phase, way: str, seq: int, **more: Any) -> None:
+        drone.tell("status", status(phase, way, seq=seq, stamp_ns=seq * 10**9, **more))
+
+    def visited(seq: int, node: str) -> None:
+        drone.tell("events", (EventReport(1, "s", seq, seq * 10**9, EventLevel.INFO, "visited", node),))
+
+    async def go() -> None:
+        running = asyncio.create_task(drone.run(link))  # type: ignore[arg-type]
+        drone.tell("link", LinkState(True, 0.0, 1.0, 0, False, False, ""))
+        drone.tell("welcome", {"session": "one", "role": "operator", "floor": floor})
+        drone.tell("events", ())
+        tell(Phase.PREFLIGHT, "", 1, waits_at="")
+        await asyncio.sleep(3.0)
+        low, right = scan("low", levels=[1]), scan("right", levels=[2, 1], side="right")
+        drone.hear(order("A1 A2 A3", actions={"A2": [low], "A3": [right]}))
+        await asyncio.sleep(5.0)
+        plan = drone.kept().plans[-1]
+        at_a2, at_a3 = (NodeCount("A2", "left", (1,)),), (NodeCount("A3", "right", (1, 2)),)
+        assert link.counts[-1] == (at_a2 if knows else None)
+        tell(Phase.SCAN, "A2 A2 A1", 100, plan=plan, waits_at="A2")
+        await asyncio.sleep(1.0)
+        visited(101, "A2")
+        tell(Phase.HOLD, "A2 A1", 102, plan=plan, waits_at="A2")
+        await asyncio.sleep(3.0)
+        assert link.asked[-1] == "goto"
+        assert link.counts[-1] == (at_a3 if knows else None)
+        assert not drone.vehicle.is_over("right")
+        running.cancel()
+        await asyncio.wait([running])
+
+    virtual(go())
 
 
 @pytest.mark.parametrize(("waits_at", "asked"), [("", "plan A2, to wait there"), (None, "plan A2")])

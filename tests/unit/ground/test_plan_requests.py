@@ -7,11 +7,15 @@ import pytest
 
 from flightd.adapters.ground_link.messages.answers import Accepted, Code, PlanAnswer, Planned, Refused
 from flightd.adapters.ground_link.messages.base import VERSION
-from flightd.adapters.ground_link.messages.requests import Order, PlanFlight
+from flightd.adapters.ground_link.messages.counts import NodeCount
+from flightd.adapters.ground_link.messages.requests import AskPlan, Order, PlanFlight
+from flightd.adapters.ground_link.plan_answers import PlanAnswers
 from flightd.adapters.ground_link.protocol import MAX_REQUEST_BYTES, decode_answer, encode
+from flightd.app.build import pilot_of
+from flightd.core.count_choice import ShelfCount
 from flightd.core.planned_flight import MOST_NODES
 from flightd.core.types import CommandKind, Phase
-from tests.unit.ground.request_handler_rig import OPERATOR, VIEWER, RequestHandlerRig, S, body
+from tests.unit.ground.request_handler_rig import CONFIG, OPERATOR, SITE, VIEWER, RequestHandlerRig, S, body
 
 
 def waiting() -> RequestHandlerRig:
@@ -146,6 +150,23 @@ def test_a_plan_over_nodes_and_a_goto_may_end_by_waiting_and_nothing_else() -> N
     refused(flies.order("goto", node="A3", lands=True), Code.NODE)
     assert isinstance(flies.order("goto", node="A1", lands=True), Accepted)
     refused(rig.plan(waits=True), Code.MALFORMED)
+
+
+def test_what_is_counted_at_each_node_reaches_the_mission_and_is_told_of_the_plan() -> None:
+    rig, flies = waiting(), RequestHandlerRig()
+    told = [{"node": "A2", "side": "left", "levels": [1]}, {"node": "A3"}]
+    assert isinstance(rig.plan("A2", "A3", counts=told), Planned)
+    assert isinstance(flies.order("goto", node="A3", counts=[]), Accepted)
+    (plan,), (goto,) = rig.handler.take_commands(), flies.handler.take_commands()
+    assert plan.counts == (ShelfCount("A2", "left", (1,)), ShelfCount("A3"))
+    assert goto.counts == (), "nothing"
+    mission = pilot_of(CONFIG.with_values(mission={"autostart": False}), SITE).mission
+    mission.command(plan, rig.now_ns)
+    answer = PlanAnswers(mission, "s").standing(AskPlan(version=VERSION, id="request-1"))
+    assert answer.counts == (NodeCount("A2", "left", (1,)), NodeCount("A3"))
+    refused(flies.order("pause", counts=[]), Code.MALFORMED)
+    refused(rig.plan("A2", counts=[{"node": "A2", "side": "up"}]), Code.MALFORMED)
+    refused(rig.plan("A2", counts=[{"node": "A2", "levels": [0]}]), Code.MALFORMED)
 
 
 def test_what_a_client_leaves_out_a_daemon_of_before_need_not_know() -> None:
