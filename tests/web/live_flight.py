@@ -23,6 +23,7 @@ from flightd.app.flight import Flight
 from flightd.app.publishers import TelemetryPublishers
 from flightd.config.schema import Config
 from flightd.core.preview import CameraName, Preview, found_lines
+from flightd.core.scanning import Finding
 from flightd.core.snapshot import Snapshot
 from flightd.core.types import Command, Event, LineSet, Phase
 from flightd.sim.floor.renderer import Renderer
@@ -84,6 +85,8 @@ class _PacedFlight(IdealFlight):
         self.seen: tuple[LineSet, Kinematics] | None = None
         self.phase = Phase.PREFLIGHT
         self.on_tick = self._keep_pace
+        self.found: set[str] = set()
+        self.on_record = self._note_count
 
     def pace(self, speed: float) -> None:
         """From now on so many times as fast as the clock."""
@@ -102,6 +105,10 @@ class _PacedFlight(IdealFlight):
         lines = super()._see(seq)
         self.seen = lines, self.airframe.kinematics(self.now_ns())
         return lines
+
+    def _note_count(self, _topic: str, _stamp_ns: int, message: object) -> None:
+        if isinstance(message, Finding):
+            self.found.add(message.location)
 
     def _keep_pace(self, phase: Phase, now_ns: int) -> None:
         self.phase = phase
@@ -160,6 +167,11 @@ class LiveFlight:
     def phase(self) -> Phase:
         """What the mission does now."""
         return self._flight.phase
+
+    @property
+    def counted(self) -> frozenset[str]:
+        """The locations that it has counted by now."""
+        return frozenset(self._flight.found)
 
     @property
     def x_m(self) -> float:

@@ -74,10 +74,10 @@ class PaperLink:
     async def run(self) -> None:
         await self.drone.run()
 
-    async def act(self, act: Act, *, by_person: bool = True) -> Accepted:
+    async def act(self, act: Act, **how: Any) -> Accepted:
         if not self.is_reached:
             raise UnavailableError(f"{self.name} cannot be reached: no answer")
-        return await self.drone.act(act, by_person=by_person)
+        return await self.drone.act(act, **how)
 
     async def plan_flight(self, *asked: Any, **how: Any) -> Planned:
         return await self.drone.plan_flight(*asked, **how)

@@ -13,6 +13,7 @@ from flightd.adapters.ground_link.client import Address
 from flightd.config.schema import load_config
 from flightd.core.types import Phase
 from flightd.fleet.vda5050.codec import Version, encoded
+from flightd.fleet.vda5050.parts import BlockingType
 from flightd.fleet.vehicle.drone_factsheet import Measures
 from flightd.ground.mqtt.broker_address import read_broker
 from flightd.ground.mqtt.fleet_link import FleetLink
@@ -179,3 +180,35 @@ def test_by_version_2_1_a_shelf_is_counted_and_without_a_broker_the_drone_holds_
     with LiveFlight(RACKS, config, speed=6.0, front=IdealFront(RACKS, SIGHT, Stock())) as flight:
         two = Version.V2_1
         managed(tmp_path, flight, lambda _, master, broker: go(flight, master, broker), written, 2.0, two)
+
+
+@pytest.mark.realtime(cores=0.7)
+def test_an_order_counts_at_each_node_the_side_and_levels_that_it_asks_for_there_and_nothing_else(
+    tmp_path: Path,
+) -> None:
+    low, right = scan("low", levels=[1]), scan("right", levels=[1, 2], side="right")
+    more = [scan("high", BlockingType.SOFT, levels=[2]), scan("all", BlockingType.SOFT, levels=[1, 2])]
+
+    async def go(flight: LiveFlight, master: Master) -> None:
+        await until(lambda: master.mode == "AUTOMATIC" and master.is_at("A1"))
+        await master.order("A1 A2 A3", 2, actions={"A2": [low]})
+        await until(lambda: master.actions.get("low") == "FINISHED", 60)
+        assert flight.counted == hangs("A2", "left", 1)
+        await master.order("A2 A3", number=1, first=2, actions={"A3": [right]})
+        await until(lambda: master.actions.get("right") == "FINISHED", 60)
+        two = hangs("A2", "left", 1) | hangs("A3", "right", 1, 2)
+        assert flight.counted == two
+        await until(lambda: flight.phase is Phase.HOLD, 60)
+        await master.order("A3 A4", name="left of it", actions={"A3": more})
+        await until(lambda: master.actions == {"high": "FINISHED", "all": "FINISHED"}, 60)
+        assert flight.counted == two | hangs("A3", "left", 1, 2), "it is asked for where the drone is already"
+        await until(lambda: master.is_at("A4") and flight.phase is Phase.HOLD, 60)
+        assert flight.counted == two | hangs("A3", "left", 1, 2)
+
+    def hangs(node: str, side: str, *levels: int) -> frozenset[str]:
+        here = (one for one in RACKS.locations.values() if (one.node, one.side) == (node, side))
+        return frozenset(one.code for one in here if one.level in levels)
+
+    config = CONFIG.with_values(front_camera=FITTED)
+    with LiveFlight(RACKS, config, speed=6.0, front=IdealFront(RACKS, SIGHT, Stock())) as flight:
+        managed(tmp_path, flight, lambda _, master, __: go(flight, master), [])

@@ -83,13 +83,13 @@ def test_what_is_ordered_stands_in_the_memory_before(tmp_path: Path) -> None:
         for drone in fleet.drones.values():
             act = drone.act
 
-            async def watched(order: Act, *, by_person: bool = True, drone=drone, act=act):  # type: ignore[no-untyped-def]
+            async def watched(order: Act, *, drone=drone, act=act, **how: Any):  # type: ignore[no-untyped-def]
                 known = memory.read()
                 assert known is not None
                 if order.command is CommandKind.GOTO:
                     ordered.append(order.node)
                     assert any(order.node in way for way in known[1].drones[drone.name].ways)
-                return await act(order, by_person=by_person)
+                return await act(order, **how)
 
             drone.act = watched  # type: ignore[assignment, method-assign]
         fleet.own.ask(["A3", "B4"])
