@@ -78,4 +78,5 @@ def _planned(plan: Planned) -> list[str]:
 def _standing(plan: PlanAnswer) -> list[str]:
     left = f"left: {' '.join(plan.remaining)}" if plan.remaining else "nothing left"
     levels = f"level {', '.join(map(str, plan.levels))}" if plan.levels else "all levels"
+    levels = levels if plan.counts is None else "at each node what was told for it"
     return [" ".join(plan.nodes), levels, f"{len(plan.visited)} visited, {left}"]

@@ -147,9 +147,12 @@ class Vehicle:
 
     @property
     def actions(self) -> dict[str, tuple[Action, ...]]:
-        """The order's actions at each node of the base when the drone comes there next; where some are not
-        over at the node that it is at, these."""
-        found = {node.node_id: tuple(node.actions) for node in reversed(self._route.base)}
+        """The order's actions that are not over: at each node of the base those of the drone's next visit; at
+        the node that it is at, where it has some, these."""
+        found = {
+            node.node_id: tuple(one for one in node.actions if not self.is_over(one.action_id))
+            for node in reversed(self._route.base)
+        }
         return found | ({self.last_node: self._actions.due} if self._actions.due else {})
 
     def is_over(self, action_id: str) -> bool:

@@ -12,13 +12,13 @@ from flightd.fleet.vehicle.abilities import ScanShelf, known_actions, scan_shelf
 from flightd.fleet.vehicle.signals import Reached
 from flightd.site.site import Side
 from flightd.site.site_file import load_site
-from tests.unit.fleet.vehicle_rig import BOTH, V2, Drone, floor_of, order
+from tests.unit.fleet.vehicle_rig import BOTH, V2, Drone, floor_of, instant, order
 
 RACKS = load_site(Path(__file__).parents[3] / "configs" / "site-racks-small.toml")
 """Places on levels 1 and 2 of both sides of A2 and A3, on the left of A1, on the right of B1."""
 
 
-def scan(name: str = "x", **told: str | list[int]) -> Action:
+def scan(name: str = "x", /, **told: str | list[int]) -> Action:
     """A scanShelf with these parameters alone."""
     parameters = [ActionParameter(key=key, value=value) for key, value in told.items()]
     return Action(
@@ -104,6 +104,16 @@ def test_the_actions_of_the_next_visit_and_those_that_go_on_are_told_by_node(ver
     assert asked == {"A2": ["l"], "A3": ["r", "both"]}
     drone.say(Reached("A2"))
     assert [one.action_id for one in drone.vehicle.actions["A2"]] == ["l"], "it goes on"
+
+
+@BOTH
+def test_a_cancelled_order_has_nothing_counted_at_the_node_where_it_ends(version: Version) -> None:
+    drone = stands(version)
+    drone.say(order("A1 A2 A3", actions={"A2": [scan("l", side="left")]}))
+    drone.is_at("A1", driving=True)
+    drone.say(instant("cancelOrder"))
+    assert drone.vehicle.ahead == ("A2",)
+    assert drone.vehicle.actions == {"A2": ()}
 
 
 def test_the_factsheet_says_what_side_means_and_that_both_may_be_left_out() -> None:
