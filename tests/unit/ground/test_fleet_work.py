@@ -111,7 +111,7 @@ def test_what_a_drone_refuses_that_alone_may_do_it_has_its_reason() -> None:
 
 
 def test_a_count_that_fails_is_not_done_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(_: ShelfCounts, action: Action, *__: Any) -> Progress:
+    def fails(_: ShelfCounts, action: Action, *__: Any, **___: Any) -> Progress:
         return Progress(action.action_id, ActionStatus.FAILED, "no front camera")
 
     async def go(fleet: PaperFleet) -> None:
