@@ -25,8 +25,8 @@ _SAMPLES = 96
 """Longer side at which a core is looked at: a few millimetres to the pixel."""
 _SMALLEST_PX = 12
 _WHITE_SHARE = 99.5
-_LABEL_SHARE = 85.0
-"""So much of a code is ink, or less light than most of its paper."""
+_LABEL_SHARE = 95.0
+"""So much of a label is ink, or less light than its paper."""
 _LEAST_WHITE = 110.0
 """A picture without anything lighter has no paper in it, and white is not known."""
 _BURNT, _BURNT_PART = 250, 0.001

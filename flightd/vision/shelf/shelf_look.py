@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from statistics import median
 from typing import TypeAlias
 
 import cv2
@@ -24,6 +23,8 @@ from flightd.vision.shelf.opening_raster import onto_opening
 Box: TypeAlias = tuple[int, int, int, int]
 """(x0, y0, x1, y1) in pixels, far ends excluded."""
 
+_LIGHTER = 75.0
+"""The paper counts that is lighter than so many of hundred labels' is."""
 _MARGIN = 0.1
 """Room around the wanted places, as a part of their size: a pose is never exact."""
 
@@ -56,7 +57,7 @@ def read_shelf(
             kept[look.evidence] = jpeg
     per_ms = cv2.getTickFrequency() * 1e-3
     timings = {"codes": (read - started) / per_ms, "places": (cv2.getTickCount() - read) / per_ms}
-    white = median(level for _, level in papers) if papers else lightest(_cut(bgr, box))
+    white = _white([level for _, level in papers]) if papers else lightest(_cut(bgr, box))
     how = timings, exposure, gain, round(white, 1)
     return CodeSet(seq, stamp_ns, width, height, reads, tuple(looks), *how), kept
 
@@ -112,7 +113,12 @@ def _whites(places: Sequence[Place], papers: Sequence[tuple[CodeRead, float]]) -
     for place in places:
         here = [level for read, level in papers if _contains(_lit(place), read)]
         found.setdefault(place.level, []).extend(here)
-    return {level: median(here) for level, here in found.items() if here}
+    return {level: _white(here) for level, here in found.items() if here}
+
+
+def _white(papers: Sequence[float]) -> float:
+    """White by the paper of several labels: some are grey, or in the shade of goods."""
+    return float(np.percentile(papers, _LIGHTER))
 
 
 def _lit(place: Place) -> Quad:
