@@ -31,8 +31,8 @@ class Occupancy(enum.StrEnum):
 
 
 class Light(enum.StrEnum):
-    """How a place comes out in a picture: `BURNT` where parts of it are as white as can be, `DIM` where the
-    whole picture is too dark to know white."""
+    """How a place comes out in a picture: `BURNT` where parts of it are as white as can be, `DIM` where white
+    paper on its level, or in the whole picture where none is there, is too dark to tell anything by."""
 
     FAIR = "fair"
     BURNT = "burnt"

@@ -101,7 +101,7 @@ class LocationVotes:
             self._seen[occupancy] += 1
             if occupancy is Occupancy.EMPTY:
                 self._empty_in_a_row += 1
-            elif occupancy is not Occupancy.UNSURE or place.deck:
+            elif place.occupancy is not Occupancy.UNSURE or place.deck:
                 self._empty_in_a_row = 0
             else:
                 self._blind += 1

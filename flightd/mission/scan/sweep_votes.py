@@ -88,9 +88,10 @@ class SweepVotes:
                     self._whole_empty += place.occupancy is Occupancy.EMPTY
                 if fair:
                     self._fair_rad.append(bearing_rad)
-                    whole = [bearing_rad] * (share >= _WHOLE_SHARE)
-                    self._whole_rad += whole
-                    self._telling_rad += whole * place.deck
+                    if share >= _WHOLE_SHARE:
+                        self._whole_rad.append(bearing_rad)
+                        if place.deck:
+                            self._telling_rad.append(bearing_rad)
         if reads:
             self.newest_ns = max(self.newest_ns, pose.stamp_ns)
         self._doubtful.update(doubtful)

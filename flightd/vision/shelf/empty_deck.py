@@ -43,10 +43,7 @@ _STEP = 0.06
 def would_show(deck: Quad, core_px: float) -> bool:
     """Whether the deck of an empty place can be told: the part of it in `deck`, as in `Place`, is seen from
     well enough above, beside the core, which is so high in the picture."""
-    if not deck:
-        return False
-    far, near = (deck[0][1] + deck[1][1]) / 2, (deck[2][1] + deck[3][1]) / 2
-    return near - far >= max(_LEAST_PX, _FOOT_PART * core_px)
+    return bool(deck) and _height_px(deck) >= max(_LEAST_PX, _FOOT_PART * core_px)
 
 
 def is_seen(picture: Image, deck: Quad, core: Image, white: float) -> bool:
@@ -56,13 +53,12 @@ def is_seen(picture: Image, deck: Quad, core: Image, white: float) -> bool:
         return False
     centre = np.array(picture.shape[1::-1]) / 2 - 0.5
     corners = np.array(deck) + centre
-    far, near = float(corners[:2, 1].mean()), float(corners[2:, 1].mean())
-    height_px = near - far
+    near, height_px = float(corners[2:, 1].mean()), _height_px(deck)
     if height_px < _LEAST_PX:
         return False
     span = float(corners[[0, 3], 0].max()), float(corners[[1, 2], 0].min())
     misplaced_px = _MISPLACED_PART * core.shape[0]
-    colours, spread, top = _rows(picture, span, (far - height_px - misplaced_px, near + misplaced_px))
+    colours, spread, top = _rows(picture, span, (near - 2.0 * height_px - misplaced_px, near + misplaced_px))
     least_px = max(_LEAST_PART * height_px, _FOOT_PART * core.shape[0])
     if len(colours) < least_px:
         return False
@@ -73,6 +69,11 @@ def is_seen(picture: Image, deck: Quad, core: Image, white: float) -> bool:
     return any(
         stop - start + 2 >= least_px and abs(top + stop - near) <= misplaced_px for start, stop in _runs(even)
     )
+
+
+def _height_px(deck: Quad) -> float:
+    (_, far_left), (_, far_right), (_, near_right), (_, near_left) = deck
+    return (near_left + near_right - far_left - far_right) / 2
 
 
 def _rows(

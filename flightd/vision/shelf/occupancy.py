@@ -5,7 +5,7 @@ of the rack.  But goods may be as dark as that.  So a place is empty only where,
 to see in that dark (mesh, other goods' backs: a dark face shows nothing) and the deck is seen from the front
 on to deep behind it (`deck`), which goods hide.
 Goods have faces that catch the light, with edges; a cover (a sheet, foil) catches the light and is smooth.
-Dark means dark against the white of paper in the same picture, so exposure does not matter.  What fits no
+Dark means dark against white paper in the same light, so exposure does not matter.  What fits no
 case is `UNSURE`: an empty place is never guessed.
 """
 
@@ -38,7 +38,9 @@ _STEP = 0.035
 _EMPTY_DARK, _EMPTY_EDGES = 0.38, 0.10
 _GOODS_DARK = 0.30
 _COVER_EDGES = 0.01
-_LEAST_GRAIN = 0.0115
+_LEAST_GRAIN, _LEAST_GRAIN_LEVELS = 0.0115, 1.8
+"""Finer structure that the dark of an empty place has at least, as a part of white and in grey levels: less
+is a camera's noise."""
 _GRAIN_SAMPLES = 9
 """Samples over which what is even is taken out of the grain."""
 
@@ -53,10 +55,9 @@ class CoreMeasures:
     grain: float
 
 
-def white_level(picture: Image) -> float:
-    """The grey level of white paper in a picture, (H, W, 3) BGR; NaN where nothing is so light."""
-    white = lightest(picture)
-    return white if white >= _LEAST_WHITE else float("nan")
+def known_white(level: float) -> float:
+    """The grey level of what is taken for white paper; NaN where it is too dark to tell anything by."""
+    return level if level >= _LEAST_WHITE else float("nan")
 
 
 def paper_level(code: Image) -> float:
@@ -103,7 +104,8 @@ def judge(core: Image, white: float, sees_deck: Callable[[], bool]) -> Occupancy
         return Occupancy.UNSURE
     seen = measure(core, white)
     if seen.dark > _EMPTY_DARK and seen.edges < _EMPTY_EDGES:
-        return Occupancy.EMPTY if seen.grain > _LEAST_GRAIN and sees_deck() else Occupancy.UNSURE
+        shows = seen.grain > max(_LEAST_GRAIN, _LEAST_GRAIN_LEVELS / white)
+        return Occupancy.EMPTY if shows and sees_deck() else Occupancy.UNSURE
     if seen.dark < _GOODS_DARK and seen.edges < _COVER_EDGES:
         return Occupancy.COVERED
     return Occupancy.GOODS if seen.dark < _GOODS_DARK or seen.edges > 2 * _EMPTY_EDGES else Occupancy.UNSURE

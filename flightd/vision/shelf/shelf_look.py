@@ -17,7 +17,7 @@ from flightd.vision.shelf import empty_deck as deck
 from flightd.vision.shelf.code_reader import read_codes
 from flightd.vision.shelf.evidence_jpeg import evidence_jpeg, picture_name
 from flightd.vision.shelf.fill_level import OpeningLook, fill_level
-from flightd.vision.shelf.occupancy import judge, light_on, lightest, paper_level, white_level
+from flightd.vision.shelf.occupancy import judge, known_white, light_on, lightest, paper_level
 from flightd.vision.shelf.opening_raster import onto_opening
 
 Box: TypeAlias = tuple[int, int, int, int]
@@ -48,7 +48,7 @@ def read_shelf(
     reads = _shifted(read_codes(_cut(bgr, box)), box, bgr)
     read = cv2.getTickCount()
     papers = _papers(bgr, reads)
-    usual, whites = white_level(bgr), _whites(places, papers)
+    usual, whites = known_white(lightest(bgr)), _whites(places, papers)
     looks, kept = [], {}
     for place in places:
         look, jpeg = _look(bgr, place, reads, whites.get(place.level), usual)
@@ -131,7 +131,7 @@ def _look(
     """What one place shows, and its picture.  `paper` is the grey level of labels on its level, None where
     there are none: then the `usual` one of white counts, that of the whole picture."""
     height, width = bgr.shape[:2]
-    white = usual if paper is None else paper
+    white = usual if paper is None else known_white(paper)
     occupancy = Occupancy.UNSURE
     # in its core: a code below may be the shelf's own label
     if any(_contains(place.core_px, read) for read in reads):

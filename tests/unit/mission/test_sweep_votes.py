@@ -296,6 +296,17 @@ def test_what_looked_empty_to_some_views_is_not_said_to_be_unreadable() -> None:
         assert state(verdict(NOTHING_AT_ALL, seen)) is Undecided.UNSURE
 
 
+def state_at_stop(seen: Sequence[Occupancy], burnt: int) -> LocationState | None:
+    """By looks of which one is burnt out, from where no deck would show."""
+    stop = LocationVotes(CODE, "A2", PARAMS.pictures)
+    for seq, occupancy in enumerate(seen):
+        light = Light.BURNT if seq == burnt else Light.FAIR
+        look = PlaceLook(CODE, QUAD, 1.0, occupancy, f"picture {seq}", light, deck=False)
+        stop.add(seq, pose(seq * 250_000_000), look, ())
+    told = stop.finding(final=True)
+    return None if told is None else told.state
+
+
 def test_from_where_no_deck_would_show_nothing_is_said_to_be_empty_or_unreadable_for_want_of_one() -> None:
     def seen(*views: tuple[Occupancy, bool]) -> tuple[LocationState | Undecided, LocationState | None]:
         votes, stop = SweepVotes(CODE, "A2", PARAMS, 1.0), LocationVotes(CODE, "A2", PARAMS.pictures)
@@ -313,6 +324,7 @@ def test_from_where_no_deck_would_show_nothing_is_said_to_be_empty_or_unreadable
     assert seen(low, empty, low, empty)[1] is LocationState.EMPTY
     assert seen(empty, hidden, empty, low, hidden, empty)[1] is LocationState.UNREADABLE
     assert seen(low, (GOODS, False), empty, empty, empty)[1] is LocationState.UNREADABLE
+    assert state_at_stop([EMPTY, GOODS, EMPTY, EMPTY], burnt=1) is LocationState.UNREADABLE
 
 
 def test_a_code_that_may_be_a_neighbours_leaves_no_place_without_a_code() -> None:
