@@ -51,7 +51,7 @@ def scan_shelf_of(action: Action) -> ScanShelf:
     levels, side = action.parameter("levels"), action.parameter("side")
     if levels is not None and not _are_levels(levels):
         raise InputError(f"is no list of 1 to {_HIGHEST} levels, from 1 to {_HIGHEST}", key="levels")
-    if side is not None and side not in {one.value for one in Side}:
+    if side is not None and side not in [one.value for one in Side]:  # no set: it may be a list
         raise InputError("is neither left nor right", key="side")
     expected = action.parameter("expected")
     codes = isinstance(expected, list) and all(isinstance(one, str) for one in expected)

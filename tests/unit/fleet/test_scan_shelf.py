@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,7 +19,7 @@ RACKS = load_site(Path(__file__).parents[3] / "configs" / "site-racks-small.toml
 """Places on levels 1 and 2 of both sides of A2 and A3, on the left of A1, on the right of B1."""
 
 
-def scan(name: str = "x", /, **told: str | list[int]) -> Action:
+def scan(name: str = "x", /, **told: Any) -> Action:
     """A scanShelf with these parameters alone."""
     parameters = [ActionParameter(key=key, value=value) for key, value in told.items()]
     return Action(
@@ -61,6 +62,12 @@ def test_side_and_levels_may_be_told_alone_together_or_not_at_all(
     [
         ("A2", {"side": "up"}, "side", "is neither left nor right"),
         ("A2", {"side": "LEFT"}, "side", "is neither left nor right"),
+        ("A2", {"side": ["left"]}, "side", "is neither left nor right"),
+        ("A2", {"side": {"of": "left"}}, "side", "is neither left nor right"),
+        ("A2", {"levels": [[1]]}, "levels", "is no list of 1 to 99 levels, from 1 to 99"),
+        ("A2", {"levels": {"1": 2}}, "levels", "is no list of 1 to 99 levels, from 1 to 99"),
+        ("A2", {"expected": [["X"]]}, "expected", "is no list of up to 10000 codes"),
+        ("A2", {"expected": {"X": 1}}, "expected", "is no list of up to 10000 codes"),
         ("A1", {"side": "right"}, "side", "the right side of node A1 has no place to count"),
         ("A2", {"levels": [3]}, "levels", "node A2 has places on level 1, 2 alone"),
         (
@@ -73,7 +80,7 @@ def test_side_and_levels_may_be_told_alone_together_or_not_at_all(
     ],
 )
 def test_what_is_not_there_is_refused_by_the_parameter_in_one_line(
-    version: Version, node: str, told: dict[str, str | list[int]], parameter: str, why: str
+    version: Version, node: str, told: dict[str, Any], parameter: str, why: str
 ) -> None:
     drone = stands(version)
     drone.say(order("A1 A2", actions={node: [scan(**told)]}))
