@@ -77,8 +77,8 @@ from flightd.adapters.ground_link.messages.requests import (
 
 STATUS_TOPIC = b"status"
 EVENT_TOPIC = b"event"
-MAX_REQUEST_BYTES = 32768
-"""A longer request ends its connection."""
+MAX_REQUEST_BYTES = 262144
+"""A longer request ends its connection.  The largest plan with two counts at each node takes a third of it."""
 
 Request: TypeAlias = (
     Hello | Order | PlanFlight | AskPlan | AskStatus | AskPicture | AskInventory | Attend | Maintenance

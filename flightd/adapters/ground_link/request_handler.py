@@ -282,6 +282,8 @@ class RequestHandler:
             seen_ns=request.seen_ns,
             waits=request.waits,
         )
+        if request.counts is not None and not request.nodes:
+            return Code.MALFORMED, "a plan comes with its nodes: op plan_flight"
         if request.waits and not request.nodes and not request.dry:
             return Code.MALFORMED, "a plan that waits at its end has nodes"
         if self._plans is None:

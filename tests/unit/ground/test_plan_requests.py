@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import msgspec
 import pytest
 
@@ -128,10 +130,10 @@ def test_a_plan_comes_with_its_nodes_and_only_a_start_names_one() -> None:
 
 
 def test_the_largest_plan_of_usual_names_fits_into_a_request() -> None:
-    request = PlanFlight(
-        version=VERSION, id="x" * 32, nodes=tuple(f"AISLE-12.{i}" for i in range(MOST_NODES))
-    )
-    assert len(msgspec.json.encode(request)) < MAX_REQUEST_BYTES
+    nodes = tuple(f"AISLE-12.{i}" for i in range(MOST_NODES))
+    counts = tuple(NodeCount(*one, tuple(range(1, 10))) for one in itertools.product(nodes, ("left", "right")))
+    request = PlanFlight(version=VERSION, id="x" * 32, nodes=nodes, counts=counts)
+    assert len(msgspec.json.encode(request)) < MAX_REQUEST_BYTES / 2
 
 
 def test_a_plan_over_nodes_and_a_goto_may_end_by_waiting_and_nothing_else() -> None:
@@ -165,6 +167,8 @@ def test_what_is_counted_at_each_node_reaches_the_mission_and_is_told_of_the_pla
     answer = PlanAnswers(mission, "s").standing(AskPlan(version=VERSION, id="request-1"))
     assert answer.counts == (NodeCount("A2", "left", (1,)), NodeCount("A3"))
     refused(flies.order("pause", counts=[]), Code.MALFORMED)
+    refused(rig.plan(counts=told), Code.MALFORMED)
+    refused(rig.plan(counts=[], dry=True), Code.MALFORMED)
     refused(rig.plan("A2", counts=[{"node": "A2", "side": "up"}]), Code.MALFORMED)
     refused(rig.plan("A2", counts=[{"node": "A2", "levels": [0]}]), Code.MALFORMED)
 
