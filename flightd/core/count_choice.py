@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,10 +15,18 @@ class ShelfCount:
     side: str = ""
     levels: tuple[int, ...] = ()
 
-    def takes(self, node: str, side: str, level: int) -> bool:
-        """Whether a location with this node, side and level is of it."""
-        here = node == self.node and self.side in {"", side}
-        return here and (not self.levels or level in self.levels)
+    def __str__(self) -> str:
+        levels = f"on level {', '.join(map(str, self.levels))}" if self.levels else ""
+        return " ".join(filter(None, (self.node, self.side, levels)))
+
+    @property
+    def alone(self) -> CountChoice:
+        """The choice of this one."""
+        return CountChoice((), (self,))
+
+    def takes(self, side: str, level: int) -> bool:
+        """Whether a location of its node with this side and level is of it."""
+        return self.side in {"", side} and (not self.levels or level in self.levels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,23 +36,25 @@ class CountChoice:
 
     levels: tuple[int, ...] = ()
     shelves: tuple[ShelfCount, ...] | None = None
+    _at: dict[str, list[ShelfCount]] = field(init=False, repr=False, compare=False)
+    """The shelves by their nodes: each location of a site is asked for."""
+
+    def __post_init__(self) -> None:
+        at: dict[str, list[ShelfCount]] = defaultdict(list)
+        for one in self.shelves or ():
+            at[one.node].append(one)
+        object.__setattr__(self, "_at", dict(at))
 
     @classmethod
     def of(cls, levels: tuple[int, ...], shelves: tuple[ShelfCount, ...] | None) -> CountChoice:
         """With `shelves`, whatever the levels are."""
         return cls(levels) if shelves is None else cls((), shelves)
 
-    def at(self, node: str) -> CountChoice:
-        """The same for the locations of one node."""
-        if self.shelves is None:
-            return self
-        return CountChoice((), tuple(one for one in self.shelves if one.node == node))
-
     def takes(self, node: str, side: str, level: int) -> bool:
         """Whether a location with this node, side and level is counted."""
         if self.shelves is None:
             return not self.levels or level in self.levels
-        return any(one.takes(node, side, level) for one in self.shelves)
+        return any(one.takes(side, level) for one in self._at.get(node, ()))
 
 
 ALL = CountChoice()

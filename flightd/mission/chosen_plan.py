@@ -53,7 +53,7 @@ class ChosenPlans:
         """The plan over these nodes, each once, home or (`waits`) to hold at the last, its shelves counted by
         stopping: who leads it on from node to node has to know its way.  InputError, one line, for a node
         that the site lacks, that no open line leads to or that a full battery does not reach and come back
-        from, and for levels that nothing is counted on."""
+        from, and for levels, or a shelf of the choice, that nothing is counted on."""
         wanted = tuple(dict.fromkeys(nodes))
         self._check(wanted, choice)
         first = self._first
@@ -127,6 +127,9 @@ class ChosenPlans:
         if choice.levels and not any(self._scanner.places_at(node, choice) for node in nodes):
             texts = ", ".join(map(str, choice.levels))
             raise InputError(f"nothing is counted on level {texts} at any of these nodes")
+        bare = [one for one in choice.shelves or () if not self._scanner.places_at(one.node, one.alone)]
+        if bare and self._scanner.counts:
+            raise InputError(f"there is no place {bare[0]}")
 
 
 def _listed(nodes: Sequence[str]) -> str:

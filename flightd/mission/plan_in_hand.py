@@ -51,11 +51,11 @@ class PlanInHand:
 
     def begin_at(self, node: str, yaw_rad: float) -> FlightPlan:
         """Stand on the pad of another node from now on; what is flown from there until another plan is
-        chosen: home."""
+        chosen: home, counting as before."""
         home = self._configured.home
         self._configured = make_plan(self._site, (), node, home, self._policy, yaw_rad)
         self._chosen.begin_at(node, yaw_rad)
-        self.plan, self.id, self._choice = self._configured, "", ALL
+        self.plan, self.id = self._configured, ""
         return self.plan
 
     def standing(self, visited: Sequence[str], remaining: tuple[str, ...]) -> StandingPlan:

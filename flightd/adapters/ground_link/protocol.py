@@ -78,7 +78,7 @@ from flightd.adapters.ground_link.messages.requests import (
 STATUS_TOPIC = b"status"
 EVENT_TOPIC = b"event"
 MAX_REQUEST_BYTES = 262144
-"""A longer request ends its connection.  The largest plan with two counts at each node takes a third of it."""
+"""A longer request ends its connection; the largest plan with two counts at each node has a third of it."""
 
 Request: TypeAlias = (
     Hello | Order | PlanFlight | AskPlan | AskStatus | AskPicture | AskInventory | Attend | Maintenance

@@ -144,7 +144,7 @@ class Scanner:
 
     def places_at(self, node: str, choice: CountChoice = ALL) -> frozenset[str]:
         """The locations that are counted from a node, as far as the choice takes them."""
-        return self._chosen(self._planner.locations(node), choice.at(node))
+        return self._chosen(self._planner.locations(node), choice)
 
     def choose(self, choice: CountChoice, *, by_stopping: bool = False) -> None:
         """Count only what it takes.  `by_stopping`: nothing in passing, which chooses its way itself."""

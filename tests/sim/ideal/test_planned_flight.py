@@ -6,7 +6,7 @@ from pathlib import Path
 
 from flightd.config.schema import Config, load_config
 from flightd.config.sweep import ScanMode
-from flightd.core.count_choice import ShelfCount
+from flightd.core.count_choice import CountChoice, ShelfCount
 from flightd.core.flight_order import ChosenPlan
 from flightd.core.planned_flight import PlannedFlight
 from flightd.core.topics import Topic
@@ -72,7 +72,8 @@ def counted(flight: Flown) -> set[str]:
 
 def of(*counts: ShelfCount) -> set[str]:
     places = SITE.locations.values()
-    return {at.code for at in places if any(one.takes(at.node, at.side, at.level) for one in counts)}
+    choice = CountChoice((), counts)
+    return {at.code for at in places if choice.takes(at.node, at.side, at.level)}
 
 
 def test_it_counts_at_each_node_the_side_and_levels_that_are_told_for_it_alone() -> None:

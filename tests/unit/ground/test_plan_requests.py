@@ -131,7 +131,9 @@ def test_a_plan_comes_with_its_nodes_and_only_a_start_names_one() -> None:
 
 def test_the_largest_plan_of_usual_names_fits_into_a_request() -> None:
     nodes = tuple(f"AISLE-12.{i}" for i in range(MOST_NODES))
-    counts = tuple(NodeCount(*one, tuple(range(1, 10))) for one in itertools.product(nodes, ("left", "right")))
+    levels = tuple(range(1, 10))
+    sides = [(NodeCount(one, "left", levels), NodeCount(one, "right", levels)) for one in nodes]
+    counts = tuple(itertools.chain.from_iterable(sides))
     request = PlanFlight(version=VERSION, id="x" * 32, nodes=nodes, counts=counts)
     assert len(msgspec.json.encode(request)) < MAX_REQUEST_BYTES / 2
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from flightd.app.build import pilot_of
 from flightd.config.battery import BatteryConfig
 from flightd.config.schema import load_config
+from flightd.core.count_choice import ShelfCount
 from flightd.core.errors import InputError
 from flightd.core.types import Command, CommandKind, Phase
 from flightd.mission.mission import Mission
@@ -141,6 +143,25 @@ def test_only_the_chosen_levels_are_counted() -> None:
     assert low.seconds < every.seconds
     with pytest.raises(InputError, match="nothing is counted on level 9"):
         mission.planned(("A2",), (9,), best_order=False)
+
+
+@pytest.mark.parametrize(
+    ("count", "why"),
+    [
+        (ShelfCount("Q7"), "there is no place Q7$"),
+        (ShelfCount("A2", "left", (2, 9)), None),
+        (ShelfCount("A3", levels=(8, 9)), "there is no place A3 on level 8, 9$"),
+        (ShelfCount("A3", "left", (9,)), "there is no place A3 left on level 9$"),
+    ],
+)
+def test_a_count_of_what_is_not_there_is_refused_where_shelves_are_counted(
+    count: ShelfCount, why: str | None
+) -> None:
+    counts = ShelfCount("A2"), count
+    demo_mission().planned(("A2",), (), best_order=False, counts=counts)
+    mission = pilot_of(CONFIG.with_values(front_camera=FITTED), shelves.SITE).mission
+    with pytest.raises(InputError, match=why) if why else nullcontext():
+        mission.planned(("A2",), (), best_order=False, counts=counts)
 
 
 def test_asking_changes_nothing() -> None:
