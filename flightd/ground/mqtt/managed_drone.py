@@ -255,6 +255,8 @@ class ManagedDrone:
         if isinstance(act, CommandNext) and act.node and event.level is EventLevel.WARNING:
             refused = event.name == "command" and event.text.startswith(f"{act.kind} {act.node} refused")
             self._trouble = (ErrorType.NODE_UNREACHABLE, event.text) if refused else self._trouble
+            if refused and act.counts is not None:
+                self._counts.forget(act.node)
         is_command = event.name == "command" and event.level is EventLevel.INFO
         is_command = is_command and event.text.split(" ")[0] in _COMMANDS
         if is_command and not self._before.gave(event.text) and not self._sent.take(event):

@@ -69,6 +69,12 @@ class ShelfCounts:
             if count.since_ns is None and count_of(count.node, count.scan) in self.given:
                 count.since_ns = stamp_ns
 
+    def forget(self, node: str) -> None:
+        """The drone refused what it had taken of this node."""
+        self.given = tuple(one for one in self.given if one.node != node)
+        for count in self._counts.values():
+            count.since_ns = None if count.node == node else count.since_ns
+
     def abort(self, action_id: str) -> None:
         """It is left off: the drone counts on, nobody waits for it."""
         self._counts.pop(action_id, None)

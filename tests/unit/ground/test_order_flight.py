@@ -335,6 +335,12 @@ def test_what_an_order_asks_to_be_counted_goes_to_the_drone_node_by_node(knows: 
         assert link.asked[-1] == "goto"
         assert link.counts[-1] == (at_a3 if knows else None)
         assert not drone.vehicle.is_over("right")
+        del link.asked[:]
+        refused = EventReport(1, "s", 103, 103, EventLevel.WARNING, "command", "goto A3 refused: no way")
+        drone.tell("events", (refused,))
+        tell(Phase.FOLLOW, "A3 A3 A1", 110, plan=plan, waits_at="A3")
+        await asyncio.sleep(1.5)
+        assert link.asked == ["goto"] * knows, "what it is to count there is told again"
         running.cancel()
         await asyncio.wait([running])
 
