@@ -49,7 +49,7 @@ from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck,
 from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
 from flightd.ground.mqtt.sent_commands import SentCommands
-from flightd.ground.mqtt.shelf_counts import ShelfCounts, counts_of
+from flightd.ground.mqtt.shelf_counts import ShelfCounts, counts_of, levels_of
 
 _LOG = logging.getLogger(__name__)
 MANUFACTURER: Final = "flightd"
@@ -130,6 +130,7 @@ class ManagedDrone:
         self._acting: asyncio.Task[None] | None = None
         self._did: tuple[Next, float, int] = (None, 0.0, 0)
         """The last act, when it was answered, and the status by which it shows."""
+        self._order: Order | None = None
         self._ahead: list[str] = []
         self._counts = ShelfCounts()
         self._plans: deque[str] = deque(maxlen=_MOST_PLANS)
@@ -361,6 +362,8 @@ class ManagedDrone:
         self._trouble = None
         self.on_decided(one)
         if isinstance(one.about, Order):
+            if one.refusal is None:
+                self._order = one.about
             nodes = " ".join(n.node_id if n.released else f"({n.node_id})" for n in one.about.nodes)
             what = f"order {one.about.order_id}/{one.about.order_update_id}: {nodes}"
         else:
@@ -443,7 +446,7 @@ class ManagedDrone:
     async def _do(self, act: PlanNext | CommandNext, status: StatusReport, link: DroneLink) -> None:
         act_id = f"{_OURS}{uuid.uuid4().hex}"
         if isinstance(act, PlanNext):
-            text = "plan"
+            text, levels = "plan", () if act.counts is not None else levels_of(self._order, act.nodes)
             self._plans.append(act_id)
         else:
             text = f"{act.kind} {act.node}".rstrip()
@@ -453,7 +456,7 @@ class ManagedDrone:
             if isinstance(act, PlanNext):
                 await link.plan_flight(
                     act.nodes,
-                    (),
+                    levels,
                     act_id,
                     session=status.session,
                     seen_ns=status.stamp_ns,
@@ -461,7 +464,7 @@ class ManagedDrone:
                     by_person=False,
                     counts=act.counts,
                 )
-                self._planned = act_id, act
+                self._planned, self._counts.levels = (act_id, act), levels
                 self._counts.tell(act.counts, None, status.stamp_ns)
             else:
                 plan = self._planned[0] if act.kind is CommandKind.START and self._planned else ""

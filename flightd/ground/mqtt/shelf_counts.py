@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from flightd.adapters.ground_link.messages.counts import Counts, NodeCount
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import FlightdError
+from flightd.fleet.vda5050.order import Order
 from flightd.fleet.vda5050.parts import Action
 from flightd.fleet.vda5050.state import ActionStatus
 from flightd.fleet.vehicle.abilities import ScanShelf, scan_shelf_of
 from flightd.fleet.vehicle.signals import Progress
 from flightd.ground.drone_link import DroneLink
+from flightd.ground.mqtt.order_flight import WAITS
 from flightd.ground.mqtt.safe_return import Standing
 
 _MOST_VISITS = 32
@@ -42,6 +44,8 @@ class ShelfCounts:
         self._visits: deque[EventReport] = deque(maxlen=_MOST_VISITS)
         self.given: tuple[NodeCount, ...] = ()
         """What the drone was told to count on this flight."""
+        self.levels: tuple[int, ...] = ()
+        """Those that one of before, which is not told so, counts on this flight; none: all."""
 
     @property
     def go_on(self) -> bool:
@@ -52,10 +56,15 @@ class ShelfCounts:
         self, action: Action, node: str, status: StatusReport, standing: Standing | None, *, tells: bool
     ) -> Progress | None:
         """Begin one at `node`; what is to be told where it cannot be done.  Not `tells`: the drone counts
-        all, and is told nothing."""
+        all on the levels of its flight, and is told nothing."""
         scan = scan_shelf_of(action)
         if standing is not None and not standing.counts:
             return Progress(action.action_id, ActionStatus.FAILED, "this drone counts no shelves")
+        is_flown = self.levels and not tells and status.phase not in WAITS
+        if is_flown and not (scan.levels and {*scan.levels} <= {*self.levels}):
+            levels = ", ".join(map(str, self.levels))
+            what = f"this flight began with level {levels} and counts no other"
+            return Progress(action.action_id, ActionStatus.FAILED, what)
         is_told = not tells or count_of(node, scan) in self.given
         since_ns = status.stamp_ns if is_told else None
         self._counts[action.action_id] = _Count(action, scan, node, since_ns)
@@ -118,6 +127,15 @@ def counts_of(actions: Mapping[str, Iterable[Action]]) -> tuple[NodeCount, ...]:
     """All that the actions at these nodes ask to be counted."""
     found = [count_of(node, scan_shelf_of(action)) for node, here in actions.items() for action in here]
     return tuple(dict.fromkeys(found))
+
+
+def levels_of(order: Order | None, nodes: Iterable[str]) -> tuple[int, ...]:
+    """The levels that all counts of an order ask for, where one of them is at these nodes; none: all.  For a
+    drone that is told no more."""
+    told = order.nodes if order else ()
+    counts = counts_of({node.node_id: node.actions for node in told})
+    levels = {one.levels for one in counts}
+    return next(iter(levels)) if len(levels) == 1 and {one.node for one in counts} & {*nodes} else ()
 
 
 def count_of(node: str, scan: ScanShelf) -> NodeCount:

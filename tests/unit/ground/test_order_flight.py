@@ -28,7 +28,7 @@ from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck,
 from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
 from flightd.ground.mqtt.safe_return import SafeReturn, Standing
 from flightd.ground.mqtt.sent_commands import SentCommands
-from flightd.ground.mqtt.shelf_counts import counted_in_words
+from flightd.ground.mqtt.shelf_counts import ShelfCounts, counted_in_words, levels_of
 from flightd.site.site import Side
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
@@ -277,10 +277,12 @@ class Link:
     def __init__(self) -> None:
         self.asked: list[str] = []
         self.counts: list[Any] = []
+        self.levels: tuple[int, ...] = ()
 
     async def plan_flight(
         self,
         asked: tuple[str, ...],
+        levels: tuple[int, ...] = (),
         *_: Any,
         dry: bool = False,
         waits: bool = False,
@@ -288,6 +290,7 @@ class Link:
         **__: Any,
     ) -> Any:
         self.counts.append(counts)
+        self.levels = self.levels if dry else levels
         self.asked += [] if dry else [f"plan {' '.join(asked)}{', to wait there' * waits}"]
         told = {"batteries": 1, "way": ("A1", "A2"), "places": 1, "sweeps": (), "seconds": 9.0, "way_m": 9.0}
         return type("Planned", (), told)
@@ -321,12 +324,13 @@ def test_what_an_order_asks_to_be_counted_goes_to_the_drone_node_by_node(knows: 
         drone.tell("events", ())
         tell(Phase.PREFLIGHT, "", 1, waits_at="")
         await asyncio.sleep(3.0)
-        low, right = scan("low", levels=[1]), scan("right", levels=[2, 1], side="right")
+        low, right = scan("low", levels=[1] if knows else [1, 2]), scan("right", levels=[2, 1], side="right")
         drone.hear(order("A1 A2 A3", actions={"A2": [low], "A3": [right]}))
         await asyncio.sleep(5.0)
         plan = drone.kept().plans[-1]
         at_a2, at_a3 = (NodeCount("A2", "left", (1,)),), (NodeCount("A3", "right", (1, 2)),)
         assert link.counts[-1] == (at_a2 if knows else None)
+        assert link.levels == (() if knows else (1, 2))
         tell(Phase.SCAN, "A2 A2 A1", 100, plan=plan, waits_at="A2")
         await asyncio.sleep(1.0)
         visited(101, "A2")
@@ -403,6 +407,19 @@ def test_no_order_outlives_the_drones_daemon_or_a_persons_command(anew: bool) ->
         await asyncio.wait([running])
 
     virtual(go())
+
+
+@pytest.mark.parametrize(("other", "levels"), [([1, 2], (1, 2)), ([1], ())])
+def test_a_daemon_of_before_counts_the_levels_that_all_counts_of_the_order_ask_for(
+    other: list[int], levels: tuple[int, ...]
+) -> None:
+    actions = {"A2": [scan("a", levels=[2, 1])], "A3": [scan("b", levels=other, side="right")]}
+    assert levels_of(order("A1 A2 A3", 2, actions=actions), ("A2",)) == levels
+    assert levels_of(order("A1 A2 A3", actions=actions), ("A1",)) == ()
+    counts, flies = ShelfCounts(), status(Phase.FOLLOW, "A3 A1")
+    counts.levels = levels
+    failed = counts.begin(scan("c", levels=[3]), "A3", flies, None, tells=False)
+    assert (failed is not None) is bool(levels)
 
 
 def test_a_count_is_told_in_words() -> None:
