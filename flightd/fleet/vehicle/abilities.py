@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from flightd.core.errors import InputError
@@ -46,13 +46,21 @@ class Ability:
     cancellable: bool = True
 
 
-def scan_shelf_of(action: Action) -> ScanShelf:
-    """What a scanShelf asks for.  InputError naming the parameter that is wrong."""
+def shelf_of(action: Action) -> ScanShelf:
+    """What a scanShelf asks for, without the codes expected there, which may be many.  InputError naming the
+    parameter that is wrong."""
     levels, side = action.parameter("levels"), action.parameter("side")
     if levels is not None and not _are_levels(levels):
         raise InputError(f"is no list of 1 to {_HIGHEST} levels, from 1 to {_HIGHEST}", key="levels")
     if side is not None and side not in [one.value for one in Side]:  # no set: it may be a list
         raise InputError("is neither left nor right", key="side")
+    chosen = tuple(dict.fromkeys(levels)) if isinstance(levels, list) else ()
+    return ScanShelf(chosen, None if side is None else Side(str(side)))
+
+
+def scan_shelf_of(action: Action) -> ScanShelf:
+    """All that a scanShelf asks for.  InputError naming the parameter that is wrong."""
+    shelf = shelf_of(action)
     expected = action.parameter("expected")
     codes = isinstance(expected, list) and all(isinstance(one, str) for one in expected)
     if expected is not None and (
@@ -60,8 +68,7 @@ def scan_shelf_of(action: Action) -> ScanShelf:
     ):
         raise InputError(f"is no list of up to {_MOST_EXPECTED} codes", key="expected")
     told = tuple(str(one) for one in expected) if isinstance(expected, list) else None
-    chosen = tuple(dict.fromkeys(levels)) if isinstance(levels, list) else ()
-    return ScanShelf(chosen, None if side is None else Side(str(side)), told)
+    return replace(shelf, expected=told)
 
 
 def _are_levels(told: object) -> bool:

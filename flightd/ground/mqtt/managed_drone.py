@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Final
 
+from flightd.adapters.ground_link.messages.counts import Counts
 from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import FlightdError, RunError
@@ -132,6 +133,8 @@ class ManagedDrone:
         """The last act, when it was answered, and the status by which it shows."""
         self._order: Order | None = None
         self._ahead: list[str] = []
+        self._wanted: Counts = None
+        """What the order wants counted, by the last step; None for a drone that is not told so."""
         self._counts = ShelfCounts()
         self._plans: deque[str] = deque(maxlen=_MOST_PLANS)
         self._planned: tuple[str, PlanNext] | None = None
@@ -310,6 +313,7 @@ class ManagedDrone:
         for one in self.vehicle.step(self.now(), [seen, *arrived, *asked]):
             self._take_output(one, status)
         self._ahead = list(self.vehicle.ahead)
+        self._see_wanted()
         self.is_automatic = mode is OperatingMode.AUTOMATIC
         self._before.see(status)
         if self.is_automatic and self._link is not None and not self._before.flies_on:
@@ -332,9 +336,11 @@ class ManagedDrone:
     @property
     def _wish(self) -> Wish:
         ahead, last = tuple(self._ahead), self.vehicle.last_node
-        counts = counts_of(self.vehicle.actions) if self._takes_counts else None
-        given = self._counts.given
-        return Wish(ahead, last, self._counts.go_on, self.flies, self.lands, self.docks, counts, given)
+        wanted, given = self._wanted, self._counts.given
+        return Wish(ahead, last, self._counts.go_on, self.flies, self.lands, self.docks, wanted, given)
+
+    def _see_wanted(self) -> None:
+        self._wanted = counts_of(self.vehicle.actions) if self._takes_counts else None
 
     @property
     def _takes_counts(self) -> bool:
@@ -383,6 +389,7 @@ class ManagedDrone:
         if self._status is None or self._ways is None:
             return None
         ids, last = [node.node_id for node in nodes], self.vehicle.last_node
+        self._see_wanted()  # an order is being looked at
         counts = self._wish.counts_at(*ids)
         return self._return.reach(ids, last, self._status, self._ways, self._standing, counts)
 

@@ -45,7 +45,8 @@ class Wish:
 
     def counts_at(self, *nodes: str) -> Counts:
         """What is to be counted at some of the nodes."""
-        return None if self.counts is None else tuple(one for one in self.counts if one.node in nodes)
+        among = frozenset(nodes)
+        return None if self.counts is None else tuple(one for one in self.counts if one.node in among)
 
     def is_told(self, node: str) -> bool:
         """Whether the drone counts at a node ahead what is to be counted there."""

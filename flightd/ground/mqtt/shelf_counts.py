@@ -13,7 +13,7 @@ from flightd.core.errors import FlightdError
 from flightd.fleet.vda5050.order import Order
 from flightd.fleet.vda5050.parts import Action
 from flightd.fleet.vda5050.state import ActionStatus
-from flightd.fleet.vehicle.abilities import ScanShelf, scan_shelf_of
+from flightd.fleet.vehicle.abilities import ScanShelf, scan_shelf_of, shelf_of
 from flightd.fleet.vehicle.signals import Progress
 from flightd.ground.drone_link import DroneLink
 from flightd.ground.mqtt.order_flight import WAITS
@@ -125,7 +125,7 @@ class ShelfCounts:
 
 def counts_of(actions: Mapping[str, Iterable[Action]]) -> tuple[NodeCount, ...]:
     """All that the actions at these nodes ask to be counted."""
-    found = [count_of(node, scan_shelf_of(action)) for node, here in actions.items() for action in here]
+    found = [count_of(node, shelf_of(action)) for node, here in actions.items() for action in here]
     return tuple(dict.fromkeys(found))
 
 
