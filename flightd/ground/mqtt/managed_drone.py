@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Final
 
-from flightd.adapters.ground_link.messages.counts import Counts
 from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import FlightdError, RunError
@@ -133,8 +132,6 @@ class ManagedDrone:
         """The last act, when it was answered, and the status by which it shows."""
         self._order: Order | None = None
         self._ahead: list[str] = []
-        self._wanted: Counts = None
-        """What the order wants counted, by the last step; None for a drone that is not told so."""
         self._counts = ShelfCounts()
         self._plans: deque[str] = deque(maxlen=_MOST_PLANS)
         self._planned: tuple[str, PlanNext] | None = None
@@ -336,11 +333,11 @@ class ManagedDrone:
     @property
     def _wish(self) -> Wish:
         ahead, last = tuple(self._ahead), self.vehicle.last_node
-        wanted, given = self._wanted, self._counts.given
+        wanted, given = self._counts.wanted, self._counts.given
         return Wish(ahead, last, self._counts.go_on, self.flies, self.lands, self.docks, wanted, given)
 
     def _see_wanted(self) -> None:
-        self._wanted = counts_of(self.vehicle.actions) if self._takes_counts else None
+        self._counts.wanted = counts_of(self.vehicle.actions) if self._takes_counts else None
 
     @property
     def _takes_counts(self) -> bool:

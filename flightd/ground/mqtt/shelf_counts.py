@@ -42,6 +42,8 @@ class ShelfCounts:
     def __init__(self) -> None:
         self._counts: dict[str, _Count] = {}
         self._visits: deque[EventReport] = deque(maxlen=_MOST_VISITS)
+        self.wanted: Counts = None
+        """What the order wants counted, by the last step; None for a drone that is not told so."""
         self.given: tuple[NodeCount, ...] = ()
         """What the drone was told to count on this flight."""
         self.levels: tuple[int, ...] = ()
