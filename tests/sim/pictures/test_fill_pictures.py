@@ -24,12 +24,12 @@ LOOK = replace(RackAppearance(), in_part=1.0)
 SEED = 31
 
 
-def fills(look: RackAppearance) -> list[tuple[LocationTruth, PlaceFill | None]]:
+def fills(look: RackAppearance, seed: int = SEED) -> list[tuple[LocationTruth, PlaceFill | None]]:
     """What is true of each place in the pictures before two nodes, and what one picture tells of it."""
     assigner = Assigner(SITE, FrontSight(CAMERA.lens, CAMERA.mount))
-    truth = stock_truth(SITE, look, CAMERA.lens.fx_px, SEED)
+    truth = stock_truth(SITE, look, CAMERA.lens.fx_px, seed)
     told: list[tuple[LocationTruth, PlaceFill | None]] = []
-    for seen in shelf_pictures(SITE, CAMERA, look, SEED, ("A2", "B3")):
+    for seen in shelf_pictures(SITE, CAMERA, look, seed, ("A2", "B3")):
         codes, _ = read_shelf(seen.picture, 0, 0, assigner.places(seen.pose, seen.view.locations))
         told += [(truth[place.location], place.fill) for place in codes.places]
     return told
@@ -55,9 +55,9 @@ def test_a_place_with_goods_at_its_sides_alone_is_not_taken_for_empty(
 
 
 def test_how_full_places_are_is_told_within_ten_points() -> None:
-    told = fills(LOOK)
+    told = [one for seed in range(SEED, SEED + 4) for one in fills(LOOK, seed)]
     known = [(true.fill, fill.share) for true, fill in told if fill is not None and fill.share is not None]
-    assert len(known) >= 0.7 * len(told) >= 8
+    assert len(known) >= 0.7 * len(told) >= 32
     assert sum(abs(share - true) <= 0.1 for true, share in known) >= 0.9 * len(known)
     assert max(true for true, _ in known) - min(true for true, _ in known) > 0.3
 
