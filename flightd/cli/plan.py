@@ -40,12 +40,13 @@ def plan(
     """
     from flightd.app.build import pilot_of
     from flightd.config.schema import load_config
+    from flightd.core.count_choice import CountChoice
     from flightd.site.site_file import load_site
 
     settings = load_config(config)
     mission = pilot_of(settings, load_site(settings.mission.site)).mission
     chosen: Sequence[str] = nodes or ()
     if not nodes and (level or best):
-        chosen = mission.planned((), (), best_order=False).nodes
-    planned = mission.planned(chosen, level or (), best_order=best)
+        chosen = mission.planned((), best_order=False).nodes
+    planned = mission.planned(chosen, CountChoice(tuple(level or ())), best_order=best)
     print(json.dumps(asdict(planned)) if as_json else "\n".join(planned_in_words(planned)))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from flightd.core.count_choice import ShelfCount
+from flightd.core.count_choice import ALL, CountChoice, ShelfCount
 
 MOST_NODES = 500
 """A plan over more nodes is refused: it is read and checked between two ticks."""
@@ -101,14 +101,8 @@ class Planner(Protocol):
         ...
 
     def planned(
-        self,
-        nodes: Sequence[str],
-        levels: Sequence[int],
-        *,
-        best_order: bool,
-        waits: bool = False,
-        counts: tuple[ShelfCount, ...] | None = None,
+        self, nodes: Sequence[str], choice: CountChoice = ALL, *, best_order: bool, waits: bool = False
     ) -> PlannedFlight:
-        """What a flight over the nodes (none: those of the configuration) would be, counting as `Command`
-        says; changes nothing.  InputError where it cannot be flown."""
+        """What a flight over the nodes (none: those of the configuration) would be, counting what `choice`
+        takes; changes nothing.  InputError where it cannot be flown."""
         ...

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
-from flightd.core.count_choice import CountChoice, ShelfCount
+from flightd.core.count_choice import ALL, CountChoice
 from flightd.core.errors import InputError
 from flightd.core.outlook import Outlook
 from flightd.core.planned_flight import PlannedFlight, StandingPlan
@@ -168,18 +168,11 @@ class Mission:
         return self._plan.standing(self.visited, self.remaining)
 
     def planned(
-        self,
-        nodes: Sequence[str],
-        levels: Sequence[int],
-        *,
-        best_order: bool,
-        waits: bool = False,
-        counts: tuple[ShelfCount, ...] | None = None,
+        self, nodes: Sequence[str], choice: CountChoice = ALL, *, best_order: bool, waits: bool = False
     ) -> PlannedFlight:
         """What a flight over the nodes would be, from the pad that it stands on first and with the battery as
         it is told now (none: what the configuration says); changes nothing.  InputError where it
         cannot be flown."""
-        choice = CountChoice.of(tuple(levels), counts)
         return self._plan.planned(nodes, choice, self._charging.charge, best_order=best_order, waits=waits)
 
     def outlook(self, now_ns: int) -> Outlook:

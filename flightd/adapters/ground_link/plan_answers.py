@@ -15,6 +15,7 @@ from flightd.adapters.ground_link.messages.answers import (
 )
 from flightd.adapters.ground_link.messages.counts import Counts, shelf_counts
 from flightd.adapters.ground_link.messages.requests import AskPlan, PlanFlight
+from flightd.core.count_choice import CountChoice
 from flightd.core.errors import InputError
 from flightd.core.planned_flight import Planner
 from flightd.core.types import Phase
@@ -46,10 +47,9 @@ class PlanAnswers:
         try:
             plan = self._planner.planned(
                 request.nodes,
-                request.levels,
+                CountChoice.of(request.levels, shelf_counts(request.counts)),
                 best_order=request.best_order,
                 waits=request.waits,
-                counts=shelf_counts(request.counts),
             )
         except InputError as err:
             return Code.PLAN, str(err)

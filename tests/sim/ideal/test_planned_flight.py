@@ -42,7 +42,7 @@ def flown(
         if phase is Phase.HOVER and later:
             flight.commands.append(later.pop())
         if not said and CommandKind.START in mission.possible_commands:
-            said.append(mission.planned(nodes, levels, best_order=False, counts=counts))
+            said.append(mission.planned(nodes, CountChoice.of(levels, counts), best_order=False))
             plan = Command("plan-0001", CommandKind.PLAN, nodes=nodes, levels=levels, counts=counts)
             flight.commands += [plan, Command("start-001", CommandKind.START, plan="plan-0001")]
 

@@ -240,7 +240,7 @@ def test_labels_that_are_too_small_to_be_read_are_told_before_the_flight_and_in_
     assert [check.text for check in checks] == [says] * bool(says)
     assert set(levels(checks)) <= {CheckLevel.WARNING}, "other states are counted"
     assert checks == [check for check in look_here(params, site) if check.name == "labels"]
-    planned = pilot_of(params, site).mission.planned((), (), best_order=False)
+    planned = pilot_of(params, site).mission.planned((), best_order=False)
     words = planned_in_words(planned)
     assert (planned.unread is not None) is bool(says)
     if planned.unread is not None:

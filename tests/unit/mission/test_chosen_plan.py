@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from flightd.app.build import pilot_of
 from flightd.config.battery import BatteryConfig
 from flightd.config.schema import load_config
-from flightd.core.count_choice import ShelfCount
+from flightd.core.count_choice import CountChoice, ShelfCount
 from flightd.core.errors import InputError
 from flightd.core.types import Command, CommandKind, Phase
 from flightd.mission.mission import Mission
@@ -93,7 +93,7 @@ def test_a_node_beyond_the_batterys_reserve_is_refused() -> None:
     mission = demo_mission(battery={"flight_s": 60.0}, mission={"nodes": ("A2",)})
     far = max(DEMO.nodes, key=lambda node: DEMO.distance_m(DEMO.home.node, node))
     with pytest.raises(InputError, match=f"does not reach {far}"):
-        mission.planned((far,), (), best_order=False)
+        mission.planned((far,), best_order=False)
 
 
 def test_it_is_taken_only_disarmed_on_the_ground_before_a_start() -> None:
@@ -134,15 +134,15 @@ def test_a_start_for_another_plan_than_stands_does_not_start() -> None:
 def test_only_the_chosen_levels_are_counted() -> None:
     config = CONFIG.with_values(front_camera=FITTED)
     mission = pilot_of(config, shelves.SITE).mission
-    every = mission.planned(("A2", "A3"), (), best_order=False)
-    low = mission.planned(("A2", "A3"), (1,), best_order=False)
+    every = mission.planned(("A2", "A3"), best_order=False)
+    low = mission.planned(("A2", "A3"), CountChoice((1,)), best_order=False)
     places = [place for place in shelves.SITE.locations.values() if place.node in {"A2", "A3"}]
     assert every.places == len(places)
     assert low.places == sum(place.level == 1 for place in places)
     assert 0 < low.places < every.places
     assert low.seconds < every.seconds
     with pytest.raises(InputError, match="nothing is counted on level 9"):
-        mission.planned(("A2",), (9,), best_order=False)
+        mission.planned(("A2",), CountChoice((9,)), best_order=False)
 
 
 @pytest.mark.parametrize(
@@ -158,16 +158,16 @@ def test_a_count_of_what_is_not_there_is_refused_where_shelves_are_counted(
     count: ShelfCount, why: str | None
 ) -> None:
     counts = ShelfCount("A2"), count
-    demo_mission().planned(("A2",), (), best_order=False, counts=counts)
+    demo_mission().planned(("A2",), CountChoice((), counts), best_order=False)
     mission = pilot_of(CONFIG.with_values(front_camera=FITTED), shelves.SITE).mission
     with pytest.raises(InputError, match=why) if why else nullcontext():
-        mission.planned(("A2",), (), best_order=False, counts=counts)
+        mission.planned(("A2",), CountChoice((), counts), best_order=False)
 
 
 def test_asking_changes_nothing() -> None:
     mission = demo_mission()
     before = mission.standing
-    mission.planned(("A4", "A2"), (), best_order=True)
+    mission.planned(("A4", "A2"), best_order=True)
     assert mission.standing == before
 
 
@@ -178,15 +178,15 @@ def test_an_estimate_visits_each_chosen_node_once_and_needs_more_for_more(data: 
     mission = Flight(READY, site).mission
     nodes = data.draw(st.lists(st.sampled_from(sorted(site.nodes)), min_size=1, max_size=10))
     best = data.draw(st.booleans())
-    planned = mission.planned(nodes, (), best_order=best)
+    planned = mission.planned(nodes, best_order=best)
     assert sorted(planned.nodes) == sorted(set(nodes))
     assert best or planned.nodes == tuple(dict.fromkeys(nodes))
     assert planned.seconds > 0
     assert planned.batteries >= 1
     assert planned.seconds <= planned.batteries * planned.battery_s + 1e-6 or planned.charge < 1
     if best:
-        assert planned.seconds <= mission.planned(nodes, (), best_order=False).seconds + 5.0
-    longer = mission.planned([*planned.nodes, *planned.nodes[:1]], (), best_order=False)
+        assert planned.seconds <= mission.planned(nodes, best_order=False).seconds + 5.0
+    longer = mission.planned([*planned.nodes, *planned.nodes[:1]], best_order=False)
     assert longer.nodes == planned.nodes
 
 

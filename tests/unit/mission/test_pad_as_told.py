@@ -55,7 +55,7 @@ def test_it_waits_on_the_pad_that_it_was_told_and_flies_on_from_there() -> None:
     flight.run(30.0)
     assert flight.phase is Phase.PREFLIGHT, "nobody ordered another flight"
     assert {PLAN, START} <= flight.mission.possible_commands
-    assert flight.mission.planned(("A2",), (), best_order=False).way[0] == "A3"
+    assert flight.mission.planned(("A2",), best_order=False).way[0] == "A3"
     flight.order(PLAN, nodes=("A2",), waits=True)
     start(flight)
     flight.to(Phase.HOLD, 120.0)

@@ -447,7 +447,7 @@ def test_a_plan_that_is_led_on_from_node_to_node_is_counted_by_stopping() -> Non
     """In passing the drone would fly along the aisle where nobody has released it to."""
     flight = Sweep(config().with_values(mission={"autostart": False}))
     flight.run(0.2)
-    passing = flight.mission.planned(("A2", "A3"), (), best_order=False)
+    passing = flight.mission.planned(("A2", "A3"), best_order=False)
     flight.order(CommandKind.PLAN, nodes=("A2", "A3"), waits=True)
     flight.order(CommandKind.START)
     flight.fly(until=lambda: flight.phase is Phase.HOLD)
@@ -458,7 +458,7 @@ def test_a_plan_that_is_led_on_from_node_to_node_is_counted_by_stopping() -> Non
     flight.order(CommandKind.HOME)
     flight.fly()
     flight.down()
-    stopping = flight.mission.planned(("A2", "A3"), (), best_order=False, waits=True)
+    stopping = flight.mission.planned(("A2", "A3"), best_order=False, waits=True)
     assert passing.sweeps
     assert not stopping.sweeps
     assert stopping.seconds > passing.seconds
@@ -470,8 +470,8 @@ def test_what_is_configured_is_told_by_stopping_however_many_nodes_it_has(
     """A manager asks every drone for it, and flies none that does not answer."""
     monkeypatch.setattr(chosen_plan, "MOST_NODES", 1)
     mission = Sweep().mission
-    passing = mission.planned((), (), best_order=False)
-    stopping = mission.planned((), (), best_order=False, waits=True)
+    passing = mission.planned((), best_order=False)
+    stopping = mission.planned((), best_order=False, waits=True)
     assert passing.sweeps
     assert not stopping.sweeps
     assert (stopping.nodes, stopping.places) == (passing.nodes, passing.places)
