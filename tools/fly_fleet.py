@@ -6,9 +6,11 @@ thirds of the time.  A drone whose flight is over starts anew on its pad.
 
 Printed, as JSON: nodes visited, flights and how they ended, the least distance between two drones at all and
 while both are in the air.  Exit 1 where two in the air came nearer than their bodies and clearances, or
-nothing was visited.  Takes two cores whole: on a busy machine drones lose their lines and land.
+nothing was visited.  A drone takes a core whole, and one that gets less loses its lines and lands: `--pace`
+makes the time of all drones, and the minutes with it, run so much faster than the station's.  Unless given it is
+what this machine's cores bear.
 
-python -m tools.fly_fleet [--minutes 10] [--seed 1] [--out DIR]
+python -m tools.fly_fleet [--minutes 10] [--pace 0.4] [--seed 1] [--out DIR]
 """
 
 from __future__ import annotations
@@ -52,6 +54,8 @@ _LAST_TOUR_S = 60.0
 _ENDING_S = 20.0
 _IN_AIR_M = 0.5
 _STEP_S = 0.05
+_CORES_EACH = 1.5
+"""Of a drone by the clock, with what it needs at times, and its share of the station's."""
 _AISLE = """
 [[aisle]]
 id = "{name}"
@@ -99,10 +103,11 @@ def hall_of(drone: str) -> str:
 class Flown:
     """The fleet's processes, and what the station told of it."""
 
-    def __init__(self, out: Path, seed: int, minutes: float) -> None:
-        self._out, self._seed = out, seed
-        self._ends_s = time.monotonic() + 60.0 * minutes
-        self._kills_s = [self._ends_s - 60.0 * minutes * (1.0 - part) for part in _KILLED_AT]
+    def __init__(self, out: Path, seed: int, minutes: float, pace: float) -> None:
+        self._out, self._seed, self._pace = out, seed, pace
+        lasts_s = 60.0 * minutes / pace
+        self._ends_s = time.monotonic() + lasts_s
+        self._kills_s = [self._ends_s - lasts_s * (1.0 - part) for part in _KILLED_AT]
         self._page, *ports = free_ports(1 + 2 * len(PADS), socket.SOCK_STREAM)
         self._ports = {name: (ports[2 * i], ports[2 * i + 1]) for i, name in enumerate(PADS)}
         self._processes: list[Process] = []
@@ -128,7 +133,7 @@ class Flown:
                     continue
                 self.visited += max(len(told["done"]) - done, 0)
                 done = len(told["done"])
-                if not told["open"] and not told["given"] and now_s < self._ends_s - _LAST_TOUR_S:
+                if not told["open"] and not told["given"] and now_s < self._ends_s - _LAST_TOUR_S / self._pace:
                     await asyncio.to_thread(self._asked, "/api/fleet/tour", {"nodes": NODES})
         finally:
             for drone in drones:
@@ -146,7 +151,7 @@ class Flown:
         ]  # fmt: skip
         for flight in itertools.count(1):
             folder = self._out / f"{name}-{flight}"
-            given = ["sim", "--speed", "1", "--warehouse", str(site), "--out", str(folder)]
+            given = ["sim", "--speed", f"{self._pace:g}", "--warehouse", str(site), "--out", str(folder)]
             given += [
                 f"--seed={self._seed + 100 * flight + ord(name)}",
                 *(f"--set={each}" for each in settings),
@@ -225,15 +230,19 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--minutes", type=float, default=10.0)
+    borne = min((os.cpu_count() or 1) / _CORES_EACH / len(PADS), 1.0)
+    parser.add_argument("--pace", type=float, default=round(borne, 2))
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
+    if not 0.05 <= options.pace <= 1.0:
+        parser.error(f"--pace {options.pace:g}: expected 0.05 to 1")
     out = options.out or Path(tempfile.mkdtemp(prefix="flightd-fleet-"))
     try:
         out.mkdir(parents=True, exist_ok=True)
         if any(out.iterdir()):
             parser.error(f"--out {out}: is not empty")
-        flown = Flown(out.resolve(), options.seed, options.minutes)
+        flown = Flown(out.resolve(), options.seed, options.minutes, options.pace)
         asyncio.run(flown.fly())
     except (OSError, FlightdError) as err:
         print(err, file=sys.stderr)
@@ -248,6 +257,8 @@ def main() -> int:
     print(
         json.dumps(
             {
+                "minutes": options.minutes,
+                "pace": options.pace,
                 "visited": flown.visited,
                 "flights": flights,
                 "least_m": round(least_m, 2),
