@@ -30,7 +30,7 @@ from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe, AirframeParams
-from flightd.sim.plant.battery_swapper import BatterySwapper
+from flightd.sim.plant.charge_pads import ChargePads, PadService
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
 from flightd.sim.plant.plant_kind import PlantKind, airframe_kind
 from flightd.sim.plant.wind import WindParams
@@ -65,8 +65,8 @@ class WorldSpec:
     """Everything that makes one simulated world; a port 0 takes any free one.  An AR.Drone has four:
     commands, navdata, video and configuration; it transmits its pictures itself.  With a `truth_url` the
     vehicle is an external simulator's, which stands on the pad, and only the camera is ours; `radio` lies
-    between a MAVLink autopilot and its companion.  With `swap_s` 0 nobody changes batteries.  The vehicle
-    stands `start_offset_m` (x, y) away from the start pad's centre.
+    between a MAVLink autopilot and its companion.  `pads` is what charge pads do.  The vehicle stands
+    `start_offset_m` (x, y) away from the start pad's centre.
     `faults` go wrong on the way.  A MAVLink autopilot is set up as the shipped parameter file says, but for
     `parameters`; its clock runs `clock_ppm` fast, its range finder measures from `range_least_m` on, and one
     beside it reads `second_range_m` more (None: there is none).  `unknowns` are what no configuration
@@ -86,7 +86,7 @@ class WorldSpec:
     wind: WindParams = field(default_factory=WindParams)
     battery_frac: float = 1.0
     battery_ah: float = 5.0
-    swap_s: float = 0.0
+    pads: PadService = field(default_factory=PadService)
     radio: RadioParams = PERFECT
     clock_ppm: float = 20.0
     range_least_m: float = 0.05
@@ -155,8 +155,7 @@ class World:
             def lamp() -> float:
                 return _LAMP if autopilot.lamp_lit else 0.0
 
-        swaps = spec.swap_s and not spec.truth_url
-        self._battery_swapper = BatterySwapper(spec.site, airframe, spec.swap_s) if swaps else None
+        self._charge_pads = None if spec.truth_url else ChargePads(spec.site, airframe, spec.pads)
         self._cameras = {"camera": _down_camera(spec, self.vehicle, clock, show, hold)}
         if own_front is not None:
             self._cameras["ardrone-front-camera"] = own_front
@@ -188,9 +187,8 @@ class World:
                 tasks.create_task(self._log_truth(), name="truth")
                 faults = self._faults.run(self._clock, self.vehicle.truth_at, self._recorder)
                 tasks.create_task(faults, name="faults")
-                if self._battery_swapper is not None:
-                    swaps = self._battery_swapper.run(self._clock, self._at)
-                    tasks.create_task(swaps, name="battery swapper")
+                if self._charge_pads is not None:
+                    tasks.create_task(self._charge_pads.run(self._clock, self._at), name="charge pads")
                 opened()
         except ExceptionGroup as failures:
             raise _cause(failures) from failures

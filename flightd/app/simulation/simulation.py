@@ -88,7 +88,7 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         wind=simulation.unknowns.wind(scenario.wind.params(), told=scenario.wind.tells_gusts),
         battery_frac=scenario.vehicle.battery,
         battery_ah=scenario.vehicle.battery_ah,
-        swap_s=scenario.vehicle.swap_s,
+        pads=scenario.vehicle.pads(),
         radio=scenario.vehicle.radio(),
         clock_ppm=scenario.vehicle.clock_ppm + simulation.unknowns.clock_ppm - 20.0,
         range_least_m=scenario.vehicle.range_least_m,

@@ -48,6 +48,7 @@ gust_mps = 0.3           # root mean square of the gusts
 battery = 1.0            # charge at the start, 0..1
 battery_ah = 5.0         # its capacity; hovering takes 14 A
 swap_s = 30.0            # time in which somebody changes it on the charge pad; 0: nobody does
+contact_s = 0.0          # instead: time in which the charge pad's contacts fill an empty one
 start_offset_m = [0.0, 0.0]  # how far from the pad it really stands at the start, x and y
 start_yaw_deg = 0.0      # how far it is turned from the heading in which it should stand, + to the right
 clock_ppm = 20.0         # by so many millionths the autopilot's clock runs fast
@@ -79,6 +80,7 @@ from flightd.sim.appearance import Appearance, preset
 from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.floor.misplaced_lines import misplaced
 from flightd.sim.judge.expectation import Expectation
+from flightd.sim.plant.charge_pads import PadService
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.front_camera import FrontCamera, front_lens
@@ -217,6 +219,7 @@ class VehicleScenario(Section):
     battery: float = Field(1.0, ge=0, le=1)
     battery_ah: float = Field(5.0, gt=0.05, le=100)
     swap_s: float = Field(30.0, ge=0, le=3600)
+    contact_s: float = Field(0.0, ge=0, le=86_400)
     start_offset_m: tuple[_Carried, _Carried] = (0.0, 0.0)
     start_yaw_deg: float = Field(0.0, ge=-180, le=180)
     radio_loss: float = Field(0.0, ge=0, le=1)
@@ -225,6 +228,16 @@ class VehicleScenario(Section):
     clock_ppm: float = Field(20.0, ge=-200_000, le=200_000)
     range_least_m: float = Field(0.05, ge=0.01, le=1)
     second_range_m: float | None = Field(None, ge=-1, le=1)
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if self.contact_s and self.swap_s and "swap_s" in self.model_fields_set:
+            raise ValueError("swap_s or contact_s: a charge pad swaps batteries or fills them; leave one out")
+        return self
+
+    def pads(self) -> PadService:
+        """What the charge pads do."""
+        return PadService(contact_s=self.contact_s) if self.contact_s else PadService(self.swap_s)
 
     def radio(self) -> RadioParams:
         """Each way between a MAVLink autopilot and its companion."""

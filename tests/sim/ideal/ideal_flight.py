@@ -36,7 +36,7 @@ from flightd.core.types import (
 from flightd.ports import Lamp
 from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
-from flightd.sim.plant.battery_swapper import BatterySwapper
+from flightd.sim.plant.charge_pads import ChargePads, PadService
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.sensors.instruments import SensorParams, Sensors
@@ -126,7 +126,7 @@ class IdealFlight:
         errors: EyeErrors | None = None,
         delay_ns: int = 68_000_000,
         airframe: AirframeParams | None = None,
-        swap_s: float = 0.0,
+        pads: PadService | None = None,
         front: IdealFront | None = None,
         world: Site | None = None,
         carried_to: str = "",
@@ -177,7 +177,7 @@ class IdealFlight:
         self.lamp: Lamp = NO_LAMP
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
-        self._battery_swapper = BatterySwapper(site, self.airframe, swap_s) if swap_s else None
+        self._charge_pads = ChargePads(site, self.airframe, pads) if pads else None
         self.counted: tuple[CountedPlace, ...] = ()
         self.on_record: Callable[[str, int, object], None] = lambda _topic, _stamp_ns, _message: None
         self.on_tick: Callable[[Phase, int], None] = lambda _phase, _now_ns: None
@@ -236,8 +236,8 @@ class IdealFlight:
             if self._now_ns >= tick_ns:
                 tick_ns += TICK_NS + self.faults.stall_ns
                 self.faults.stall_ns = 0
-                if self._battery_swapper is not None:
-                    self._battery_swapper.look(self._now_ns)
+                if self._charge_pads is not None:
+                    self._charge_pads.look(self._now_ns)
                 output = tick.run(self._now_ns)
                 self.on_tick(output.phase, self._now_ns)
                 flown.outputs.append(output)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from flightd.config.schema import Config, load_config
 from flightd.core.tick import TickOutput
 from flightd.core.types import Command, CommandKind, Phase
 from flightd.sim.plant.airframe import AirframeParams
-from flightd.sim.plant.battery_swapper import BatterySwapper
+from flightd.sim.plant.charge_pads import ChargePads, PadService
 from flightd.site.site_file import load_site, parse_site, site_toml
 from tests.rigs.brisk import QUICK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
@@ -146,7 +147,7 @@ def test_a_small_battery_flies_the_plan_in_sorties_with_its_reserve() -> None:
         config(battery=SWAPS.with_values(flight_s=60.0), battery_home=0.02, battery_land=0.01),
         visits=ROW,
         airframe=AirframeParams(battery_capacity_ah=0.2),
-        swap_s=6.0,
+        pads=PadService(swap_s=6.0),
     )
     lowest = [1.0]
     step = flight.pilot.step
@@ -177,9 +178,49 @@ def test_with_nobody_to_change_the_battery_it_gives_up() -> None:
     assert flown.outputs[-2].reason.startswith(f"{len(flight.pilot.mission.remaining)} stops left: waiting")
 
 
+def test_contacts_fill_its_battery_as_far_as_it_needs_to_go_on() -> None:
+    flight = IdealFlight(
+        DEMO, config(battery=SWAPS), visits=THREE, airframe=SMALL, pads=PadService(contact_s=100.0)
+    )
+    flight.airframe.battery_frac = LOW
+    begins: list[tuple[Phase, float]] = []
+
+    def note(phase: Phase, _now_ns: int) -> None:
+        if not begins or begins[-1][0] is not phase:
+            begins.append((phase, flight.airframe.battery_frac))
+
+    flight.on_tick = note
+    flown = flight.fly(900)
+    assert (flown.phase, flown.visited) == (Phase.DONE, [*THREE])
+    came, left = next((down, up) for (phase, down), (_, up) in pairwise(begins) if phase is Phase.SWAP)
+    assert came < 0.4
+    assert SWAPS.full <= left < SWAPS.full + 0.03, "it does not wait for more"
+
+
+def test_contacts_fill_the_battery_of_who_stands_on_them_alone() -> None:
+    flight = IdealFlight(DEMO, config(), visits=("A2",))
+    frame = flight.airframe
+    pads = ChargePads(DEMO, frame, PadService(contact_s=100.0))
+    frame.battery_frac = 0.5
+    for t in range(11):
+        pads.look(t * 10**9)
+    assert frame.battery_frac == pytest.approx(0.6), "also where it has not flown"
+    frame.y_m += 0.3
+    pads.look(21 * 10**9)
+    assert frame.battery_frac == pytest.approx(0.6), "beside the contacts"
+    frame.y_m -= 0.3
+    frame.on_floor = False
+    pads.look(31 * 10**9)
+    assert frame.battery_frac == pytest.approx(0.6), "in the air"
+    frame.on_floor = True
+    for t in range(32, 100):
+        pads.look(t * 10**9)
+    assert frame.battery_frac == 1.0
+
+
 def test_after_a_swap_the_start_command_is_waited_for_unless_it_starts_by_itself() -> None:
     flight = IdealFlight(
-        DEMO, config(battery=SWAPS, autostart=False), visits=THREE, airframe=SMALL, swap_s=5.0
+        DEMO, config(battery=SWAPS, autostart=False), visits=THREE, airframe=SMALL, pads=PadService(5.0)
     )
     flight.airframe.battery_frac = LOW
     swapped = lambda o: o.phase is Phase.SWAP and o.reason == "waiting for the start command"  # noqa: E731
@@ -206,7 +247,7 @@ def test_without_swaps_it_ends_on_the_pad_and_the_plan_left_over_is_flown_by_the
 def test_the_battery_swapper_changes_the_battery_of_a_drone_that_came_back() -> None:
     flight = IdealFlight(DEMO, config(), visits=("A2",))
     frame = flight.airframe
-    swapper = BatterySwapper(DEMO, frame, 30.0)
+    swapper = ChargePads(DEMO, frame, PadService(swap_s=30.0))
     frame.battery_frac = 0.4
     for t in range(100):
         swapper.look(t * 10**9)

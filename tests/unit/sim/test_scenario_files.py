@@ -51,6 +51,7 @@ def test_every_hazard_has_a_shipped_scenario_and_every_shipped_scenario_names_a_
         ('[[fault]]\nkind = "bare_floor"\nat_s = 1\n', "at a place for good"),
         ('[[fault]]\nkind = "battery"\nat_s = 1\ncharge = 1.5\n', r"fault\.0\.battery\.charge"),
         ("fault = 3\n", "fault"),
+        ("[vehicle]\nswap_s = 9.0\ncontact_s = 90.0\n", r"s\.toml: vehicle: .*leave one out"),
         (EXPECT + 'bears = ["left_leg"]\n', r"expect\.bears"),
         (EXPECT + 'tolerates = ["gremlin"]\n', r"expect\.tolerates: .*no such fault: 'gremlin'"),
         (EXPECT + 'tolerates = ["hit_rack"]\n', "'hit_rack' must never be, whatever goes wrong"),
