@@ -6,9 +6,9 @@ thirds of the time.  A drone whose flight is over starts anew on its pad.
 
 Printed, as JSON: nodes visited, flights and how they ended, the least distance between two drones at all and
 while both are in the air.  Exit 1 where two in the air came nearer than their bodies and clearances, or
-nothing was visited.  A drone takes a core whole, and one that gets less loses its lines and lands: by `--pace`
-the time of all drones, and the minutes with it, run so much faster than the station's.  Unless given it is what
-this machine's cores bear.
+nothing was visited.  A drone takes a core whole, and one that gets less loses its lines and lands: by
+`--pace` the time of all drones, and the minutes with it, run so much faster than the station's.  Unless
+given it is what this machine's cores bear.
 
 python -m tools.fly_fleet [--minutes 10] [--pace 0.4] [--seed 1] [--out DIR]
 """
@@ -133,11 +133,8 @@ class Flown:
                     continue
                 self.visited += max(len(told["done"]) - done, 0)
                 done = len(told["done"])
-                if (
-                    not told["open"]
-                    and not told["given"]
-                    and now_s < self._ends_s - _LAST_TOUR_S / self._pace
-                ):
+                left_s = (self._ends_s - now_s) * self._pace
+                if not told["open"] and not told["given"] and left_s > _LAST_TOUR_S:
                     await asyncio.to_thread(self._asked, "/api/fleet/tour", {"nodes": NODES})
         finally:
             for drone in drones:
