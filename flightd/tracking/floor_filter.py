@@ -260,14 +260,14 @@ class FloorFilter:
         followed, strange = self._followed([seen.across[axis] for axis in bare for seen in features], rates)
         told = FrameMeasurement()
         for sight, line in known:
-            told.add_offset(sight, line, self._x, rates)
+            told.add_offset(sight, line, self.held[line].lever_m, self._x, rates)
         for sight in sights:
             if not math.isnan(sight.turn_rad):
                 told.add_turn(sight, self._x, rates)
         self._take(told, self._unmoved(assumed=assumed, exact=exact))
         carried = FrameMeasurement()
         for sight, line in followed:
-            carried.add_offset(sight, line, self._x, rates, before)
+            carried.add_offset(sight, line, self.held[line].lever_m, self._x, rates, before)
         # a feature lives too short to tell more than the motion
         self._take(carried, _BUT_MOTION, minded=False)
         for sight, line in known + followed:
@@ -278,6 +278,7 @@ class FloorFilter:
             held.seen_ns, held.hits = stamp_ns, held.hits + 1
             held.width_m += 0.2 * (sight.width_m - held.width_m)
             held.from_m, held.to_m = sight.from_m, sight.to_m
+            held.lever_to(self.mean(FIRST_LINE + line))
         self._refind([line for _, line in known], stamp_ns)
         for sight in fresh:
             self._add(sight, rates, stamp_ns, before)
@@ -368,7 +369,7 @@ class FloorFilter:
         apart_m = sight.offset_m - self.mean(FIRST_LINE + line)
         if abs(apart_m) > self._gate_m:
             return apart_m, 0.0
-        row, _ = offset_error(sight, line, self._x, rates)
+        row, _ = offset_error(sight, line, self.held[line].lever_m, self._x, rates)
         by_roll, by_pitch = sight.offset_per_tilt
         shaken = (by_roll**2 + by_pitch**2) * self._innovations.shake_rad**2
         return apart_m, math.sqrt(max(float(row @ self._p @ row), 0.0) + sight.sigma_m**2 + shaken)
@@ -461,6 +462,7 @@ class FloorFilter:
                 stamp_ns,
                 sight.from_m,
                 sight.to_m,
+                offset_m,
                 feature=sight.feature,
             )
         )

@@ -34,11 +34,17 @@ class FrameMeasurement:
         """Across which axis an offset was seen; None for a direction."""
 
     def add_offset(
-        self, sight: LineSight, line: int, x: Matrix, rates: Rates, before: Matrix | None = None
+        self,
+        sight: LineSight,
+        line: int,
+        lever_m: float,
+        x: Matrix,
+        rates: Rates,
+        before: Matrix | None = None,
     ) -> None:
         """The offset seen less that of the line held; `before` are the first states by which the sight was
         placed where they are others now."""
-        row, error_m = offset_error(sight, line, x, rates)
+        row, error_m = offset_error(sight, line, lever_m, x, rates)
         if before is not None:
             error_m += float(row[:FIRST_LINE] @ (x[:FIRST_LINE] - before))
         self._add(row, error_m, sight.sigma_m, sight.offset_per_tilt, sight.axis)
@@ -64,13 +70,15 @@ class FrameMeasurement:
         self.axes.append(axis)
 
 
-def offset_error(sight: LineSight, line: int, x: Matrix, rates: Rates) -> tuple[Matrix, float]:
-    """d(seen offset - held offset) / d state, and that error; the line is the one held at place `line`."""
+def offset_error(
+    sight: LineSight, line: int, lever_m: float, x: Matrix, rates: Rates
+) -> tuple[Matrix, float]:
+    """d(seen offset - held offset) / d state, and that error; the line is the one held at place `line`, with
+    that lever."""
     column = FIRST_LINE + line
     row = placed(sight, x, rates)
     row[column] = -1.0
-    # as held, not as seen: what is seen has the noise in it that is weighed here, and scale would shrink
-    row[SCALE], row[HEIGHT], row[HEIGHT_SCALE] = x[column] - sight.axis_m, x[column], x[column]
+    row[SCALE], row[HEIGHT], row[HEIGHT_SCALE] = lever_m - sight.axis_m, lever_m, lever_m
     return row, sight.offset_m - float(x[column])
 
 

@@ -16,6 +16,8 @@ _LOST_NS, _NEW_HITS = 250_000_000, 10
 """A line seen less often is forgotten so soon: what only shows now and then is none.  What is found where a
 line should be that was not seen for longer is taken for that once it is surely a line, and while it is new:
 a stain that shows for a frame would else tell where the drone is, and how fast."""
+_PLAY_M = 0.1
+"""A hovering drone sways by less."""
 
 
 @dataclass(slots=True)
@@ -29,10 +31,18 @@ class HeldLine:
     seen_ns: int
     from_m: float
     to_m: float
+    lever_m: float
+    """Its offset with play: by this lever lengths are held to scale.  By the offset itself, in which there is
+    the noise that it followed, a filter would learn while it hovers that all lengths are longer: what it
+    held and by what it errs then go together."""
     hits: int = 1
     feature: int | None = None
     surveyed: bool = False
     """Its distance from another line was held against the map."""
+
+    def lever_to(self, offset_m: float) -> None:
+        """Have the lever follow the offset, but for its play."""
+        self.lever_m = min(max(self.lever_m, offset_m - _PLAY_M), offset_m + _PLAY_M)
 
     def is_lost(self, stamp_ns: int) -> bool:
         """It has not been seen lately: where it is now is what was dead-reckoned."""
