@@ -254,7 +254,7 @@ def main() -> int:
         summary = json.loads(told.read_text(encoding="utf-8"))
         flights[told.parent.name] = f"{summary['mission']}: {summary['reason']} ({summary['verdict']})"
     cell = CellSize()
-    good = flown.visited > 0 and in_air_m > cell.body_m + 2 * cell.clearance_m
+    good = flown.visited > 0 and bool(in_air_m > cell.body_m + 2 * cell.clearance_m)
     print(
         json.dumps(
             {
