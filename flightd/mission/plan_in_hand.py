@@ -39,9 +39,10 @@ class PlanInHand:
             self.plan, self.id, self._choice = self._configured, "", ALL
         self._scanner.choose(self._choice, by_stopping=self.plan.waits)
         text = f"{self.plan.nodes} nodes" if command.nodes else "as configured again"
-        text += (
-            f", counted on level {', '.join(map(str, self._choice.levels))}" if self._choice.levels else ""
-        )
+        if self._choice.levels:
+            text += f", counted on level {', '.join(map(str, self._choice.levels))}"
+        if self._choice.shelves is not None:
+            text += f", counted at {len({one.node for one in self._choice.shelves})} of them"
         return f"{text}, to hold at the last" if self.plan.waits else text
 
     def count_at(self, node: str, shelves: tuple[ShelfCount, ...] | None) -> None:

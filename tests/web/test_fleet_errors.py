@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from flightd.core.errors import RunError
+from flightd.core.errors import InputError
 from flightd.core.types import CommandKind
 from flightd.fleet.vda5050.codec import Version, encoded
 from tests.rigs.broker import Mosquitto, mosquitto
@@ -37,7 +37,7 @@ def test_a_node_that_cannot_be_reached_and_a_lost_position_are_told_word_for_wor
             await manager.say("order", encoded(order("A1 A2", number=0), version))
             await until(lambda: drone.waits_at == "A2" and manager.last("state")["lastNodeId"] == "A2")
             assert errors() == []
-            drone.refuses[CommandKind.GOTO] = RunError("refused: a pallet stands there")
+            drone.refuses[CommandKind.GOTO] = InputError("refused: a pallet stands there")
             await manager.say("order", encoded(order("A2 A3", number=1, first=2), version))
             await until(lambda: errors() == [("NODE_UNREACHABLE", unreachable)])
             assert manager.last("state")["errors"][0]["errorDescription"] == "a pallet stands there"

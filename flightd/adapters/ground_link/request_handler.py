@@ -333,6 +333,11 @@ class RequestHandler:
                 "goto needs a node, the other commands have none",
             ),
             (
+                any(one.node != node for one in order.counts or ()),
+                Code.MALFORMED,
+                f"the counts of a goto are of its own node, here {node}",
+            ),
+            (
                 (kind is CommandKind.PLAN) != planned,
                 Code.MALFORMED,
                 "a plan comes with its nodes: op plan_flight",

@@ -76,11 +76,16 @@ def decoded(kind: type[_M], data: bytes, version: Version) -> _M:
         return msgspec.convert(table.read(plain), kind)
     except msgspec.ValidationError as err:
         what, at = str(err), _AT.search(str(err))
-        path = at["path"] if at else ""
-        key = re.sub(r"\w+", lambda found: table.wire_name(found[0]), path)
+        key = wire_path(kind, at["path"], version) if at else ""
         raise MalformedError(what[: at.start()] if at else what, key=key, told=_told(plain)) from None
     except (ValueError, OverflowError) as err:
         raise MalformedError(str(err), told=_told(plain)) from None
+
+
+def wire_path(kind: type[Header], path: str, version: Version) -> str:
+    """A path into a message by the model's names, as it is in this version."""
+    table = _tables(version).get(kind, _NOTHING)
+    return re.sub(r"\w+", lambda found: table.wire_name(found[0]), path)
 
 
 def _tables(version: Version) -> Mapping[type[Header], Table]:

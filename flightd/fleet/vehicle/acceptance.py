@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Final
 
 import msgspec
 
-from flightd.fleet.vda5050.codec import Version
+from flightd.fleet.vda5050.codec import Version, wire_path
 from flightd.fleet.vda5050.errors import ErrorType
 from flightd.fleet.vda5050.order import Node, Order
 from flightd.fleet.vda5050.state import OperatingMode
 from flightd.fleet.vehicle.floor import Floor
-from flightd.fleet.vehicle.refusals import Refusal, impossibility, malformation
+from flightd.fleet.vehicle.refusals import Refusal, impossibility, is_within, malformation
 from flightd.fleet.vehicle.route import Route
 from flightd.fleet.vehicle.signals import Situation
+from flightd.fleet.vehicle.unsupported_fields import unsupported_field
 
-UNUSABLE: Final = frozenset(
-    {
-        "trajectory",
-        "corridor",
-        "minimum_load_handling_device_height",
-        "maximum_mobile_robot_height",
-        "direction",
-    }
-)
-"""Optional fields of edges that a drone on painted lines cannot do as it is told."""
 FLIES: Final = frozenset({OperatingMode.AUTOMATIC, OperatingMode.SEMIAUTOMATIC})
 """The modes in which a fleet control is in control."""
 IGNORED: Final = Refusal(ErrorType.SAME_ORDER_UPDATE_ID, "it is here already")
@@ -80,7 +70,7 @@ class Acceptance:
         first = order.nodes[0]
         if not self._in_reach(first, holding.situation):
             return Refusal(ErrorType.START_NODE_OUT_OF_RANGE, f"the drone is not at node {first.node_id}")
-        return impossibility(order, self.floor, UNUSABLE, self.speed_mps)
+        return self._impossibility(order, holding.situation, is_new=True)
 
     def _of_number(self, order: Order, current: Order, holding: Holding) -> Refusal | None:
         """What the ids of an update alone say."""
@@ -107,11 +97,23 @@ class Acceptance:
         if (first.node_id, first.sequence_id) != route.decision or not waits:
             what = f"{first.node_id} with sequenceId {first.sequence_id} is not the decision point"
             return Refusal(ErrorType.START_NODE_OUT_OF_RANGE, what)
-        return impossibility(order, self.floor, UNUSABLE, self.speed_mps)
+        return self._impossibility(order, holding.situation, is_new=False)
+
+    def _impossibility(self, order: Order, seen: Situation | None, *, is_new: bool) -> Refusal | None:
+        at = None if seen is None else seen.position
+        theta = at.theta if at is not None and is_new else None
+        if (field := unsupported_field(order, self.speed_mps, theta)) is not None:
+            path, why = wire_path(Order, field[0], self.version), field[1]
+            return Refusal(ErrorType.UNSUPPORTED_PARAMETER, f"{path} {why}", (("parameter", path),))
+        node, at_m = None if seen is None else seen.node, None if at is None else (at.x, at.y)
+        return impossibility(order, self.floor, self.floor.next_to(node, at_m), self.in_reach_m)
+
+    def allows_orders(self, mode: OperatingMode) -> bool:
+        """Whether orders are taken in a mode."""
+        return mode in FLIES or (mode is OperatingMode.INTERVENED and self.version is not Version.V2_1)
 
     def _of_mode(self, holding: Holding) -> Refusal | None:
-        takes = FLIES if self.version is Version.V2_1 else FLIES | {OperatingMode.INTERVENED}
-        if holding.mode in takes:
+        if self.allows_orders(holding.mode):
             return None
         return Refusal(ErrorType.MOBILE_ROBOT_NOT_AVAILABLE, f"the operating mode is {holding.mode}")
 
@@ -124,14 +126,7 @@ class Acceptance:
         told = node.node_position
         if seen.position is None or told is None or told.map_id != seen.position.map_id:
             return False
-        dx, dy = seen.position.x - told.x, seen.position.y - told.y
-        if math.hypot(dx, dy) <= self.in_reach_m:
-            return True
-        allowed = told.allowed_deviation_xy
-        if allowed is None or not allowed.a or not allowed.b:
-            return False
-        c, s = math.cos(allowed.theta), math.sin(allowed.theta)
-        return ((c * dx + s * dy) / allowed.a) ** 2 + ((c * dy - s * dx) / allowed.b) ** 2 <= 1.0
+        return is_within(told, seen.position.x, seen.position.y, self.in_reach_m)
 
 
 def _content(order: Order) -> Order:

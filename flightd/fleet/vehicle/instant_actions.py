@@ -8,16 +8,19 @@ from typing import Final
 import msgspec
 
 from flightd.fleet.vda5050.codec import Version
-from flightd.fleet.vda5050.errors import ErrorType
+from flightd.fleet.vda5050.errors import ErrorType, level_of
 from flightd.fleet.vda5050.parts import Action
-from flightd.fleet.vda5050.state import ActionState, ActionStatus, OperatingMode
+from flightd.fleet.vda5050.state import ActionState, ActionStatus, Error, OperatingMode
 from flightd.fleet.vehicle.refusals import Refusal
 
 _KNOWN: Final = frozenset({"startPause", "stopPause", "cancelOrder", "stateRequest", "factsheetRequest"})
 _ASKS: Final = frozenset({"stateRequest", "factsheetRequest"})
+_CLEAR: Final = "clearInstantActions"
 _IN_CONTROL: Final = frozenset({OperatingMode.AUTOMATIC, OperatingMode.SEMIAUTOMATIC})
 _MOST_KEPT: Final = 64
 """Of those that are over, so many are told; the oldest go first."""
+_NEARLY_FULL: Final = 48
+"""From so many on that is told."""
 _MOST_MET: Final = 256
 """So many are known again when they come a second time."""
 
@@ -26,9 +29,12 @@ class InstantBook:
     """The instant actions of a vehicle by their ids."""
 
     def __init__(self, version: Version) -> None:
-        self._known = _KNOWN if version is Version.V2_1 else _KNOWN | {"clearInstantActions"}
+        self._known = _KNOWN if version is Version.V2_1 else _KNOWN | {_CLEAR}
+        self._clears = "a new order" if version is Version.V2_1 else _CLEAR
         self._states: dict[str, ActionState] = {}
         self._met: deque[str] = deque(maxlen=_MOST_MET)
+        self._let_go = 0
+        """States that are told no more though nobody cleared them."""
         self._is_paused = False
         self._stands = False
         self._state_wanted = False
@@ -60,6 +66,16 @@ class InstantBook:
     def states(self) -> list[ActionState]:
         """As the state tells them."""
         return list(self._states.values())
+
+    def errors(self) -> list[Error]:
+        """That there are nearly too many states, or some had to go: until they are cleared."""
+        if sum(one.action_status.is_over for one in self._states.values()) < _NEARLY_FULL:
+            return []
+        kind = ErrorType.INSTANT_ACTION_STATES_FULL
+        gone = f"; the oldest {self._let_go} are told no more" if self._let_go else ""
+        what = f"of instant actions that are over {_MOST_KEPT} are told at most{gone}"
+        hint = f"{self._clears} clears them"
+        return [Error(error_type=kind, error_level=level_of(kind), error_description=what, error_hint=hint)]
 
     def refusal(self, action: Action, mode: OperatingMode, active_order: str | None) -> Refusal | None:
         """Why an action is not done.  `active_order`: the id of the order that can be cancelled, None: there
@@ -114,6 +130,7 @@ class InstantBook:
     def forget_over(self) -> None:
         """Tell no more of those that are over."""
         self._states = {name: one for name, one in self._states.items() if not one.action_status.is_over}
+        self._let_go = 0
 
     def take_state_request(self) -> bool:
         """Whether a state was asked for since the last call."""
@@ -141,3 +158,4 @@ class InstantBook:
         over = [name for name, one in self._states.items() if one.action_status.is_over]
         for name in over[: max(0, len(over) - _MOST_KEPT)]:
             del self._states[name]
+            self._let_go += 1

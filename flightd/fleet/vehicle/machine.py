@@ -39,6 +39,7 @@ from flightd.fleet.vehicle.signals import (
     Hold,
     Input,
     Malformed,
+    Missed,
     Output,
     Progress,
     Reached,
@@ -113,6 +114,10 @@ class Vehicle:
                     out += self._take_order(one)
                 case InstantActions():
                     out += self._take_instant(one)
+                case Missed(Order() as order, refusal):
+                    out += self._take_order(order, refusal)
+                case Missed(InstantActions() as actions, refusal):
+                    out += self._take_instant(actions, refusal)
                 case Malformed():
                     self._errors.malformed(one)
                 case Situation():
@@ -225,7 +230,7 @@ class Vehicle:
         is_over = not self._route.nodes and not self._route.edges and self._actions.is_over
         return is_over and not self._instant.cancels
 
-    def _take_order(self, order: Order) -> Iterator[Output]:
+    def _take_order(self, order: Order, missed: Refusal | None = None) -> Iterator[Output]:
         horizon = {action.action_id for part in self._route.horizon for action in part.actions}
         holding = Holding(
             order=self._order,
@@ -240,6 +245,7 @@ class Vehicle:
         refusal = self._acceptance.refusal(order, holding)
         if refusal is IGNORED:
             return
+        refusal = refusal or missed
         if refusal is not None:
             self._errors.order_refused(order, refusal)
             yield Decided(order, refusal)
@@ -269,11 +275,11 @@ class Vehicle:
 
     # instant actions
 
-    def _take_instant(self, message: InstantActions) -> Iterator[Output]:
+    def _take_instant(self, message: InstantActions, missed: Refusal | None = None) -> Iterator[Output]:
         for action in message.actions:
             if self._instant.knows(action.action_id):
                 continue
-            refused = self._instant.refusal(action, self._mode, self._active_order)
+            refused = self._instant.refusal(action, self._mode, self._active_order) or missed
             if refused is not None:
                 self._instant.fail(action)
                 self._errors.instant_refused(message, action, refused)
@@ -352,7 +358,8 @@ class Vehicle:
             if self._situation.mode in _LOSES_NODE:
                 self._last_node = "", self._last_node[1]
         self._mode = self._situation.mode
-        self._errors.drop(ErrorType.MOBILE_ROBOT_NOT_AVAILABLE)
+        if self._acceptance.allows_orders(self._mode):
+            self._errors.drop(ErrorType.MOBILE_ROBOT_NOT_AVAILABLE)
 
     @property
     def _may_fly(self) -> bool:
@@ -423,7 +430,7 @@ class Vehicle:
             instant_action_states=instant,
             power_supply=seen.power,
             operating_mode=self._mode,
-            errors=[*self._errors.states(), *seen.errors],
+            errors=[*self._errors.states(), *self._instant.errors(), *seen.errors],
             information=list(seen.information) or None,
             safety_state=seen.safety,
         )

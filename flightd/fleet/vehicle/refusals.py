@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from flightd.core.errors import InputError
 from flightd.fleet.vda5050.errors import ErrorType
-from flightd.fleet.vda5050.order import Node, Order
+from flightd.fleet.vda5050.order import Node, NodePosition, Order
 from flightd.fleet.vda5050.parts import Action
 from flightd.fleet.vehicle.abilities import ABILITIES
 from flightd.fleet.vehicle.floor import Floor
@@ -67,36 +68,16 @@ def _releases(order: Order) -> Iterator[str]:
             yield f"nodes[{i + 1}].released: the edge before it is not"
 
 
-def impossibility(order: Order, floor: Floor, unusable: Collection[str], speed_mps: float) -> Refusal | None:
-    """Why an order of good form cannot be flown here: optional fields (`unusable`, by their names in the
-    model; a limit below the vehicle's own `speed_mps`), actions, the map, ways."""
+def impossibility(order: Order, floor: Floor, next_to: Collection[str], in_reach_m: float) -> Refusal | None:
+    """Why an order of good form cannot be flown here: actions, the map, ways.  `next_to` are the nodes to
+    which the drone can fly at once, `in_reach_m` is how far from its place on the floor a node may be told
+    to lie."""
     return (
-        _unusable_field(order, unusable)
-        or _speed_limit(order, speed_mps)
-        or _impossible_action(order, floor)
+        _impossible_action(order, floor)
         or _other_map(order, floor)
-        or _no_way(order, floor)
+        or _elsewhere(order, floor, in_reach_m)
+        or _no_way(order, floor, next_to)
     )
-
-
-def _unusable_field(order: Order, unusable: Collection[str]) -> Refusal | None:
-    for i, edge in enumerate(order.edges):
-        for name in sorted(unusable):
-            if getattr(edge, name, None) is not None:
-                what = f"edges[{i}].{name}"
-                return Refusal(
-                    ErrorType.UNSUPPORTED_PARAMETER, f"{what} cannot be used", (("parameter", what),)
-                )
-    return None
-
-
-def _speed_limit(order: Order, speed_mps: float) -> Refusal | None:
-    for i, edge in enumerate(order.edges):
-        if edge.maximum_speed is not None and edge.maximum_speed < speed_mps:
-            what = f"edges[{i}].maximum_speed"
-            text = f"{what} cannot be less than {speed_mps:g} m/s"
-            return Refusal(ErrorType.UNSUPPORTED_PARAMETER, text, (("parameter", what),))
-    return None
 
 
 def _impossible_action(order: Order, floor: Floor) -> Refusal | None:
@@ -130,14 +111,36 @@ def _other_map(order: Order, floor: Floor) -> Refusal | None:
     return None
 
 
-def _no_way(order: Order, floor: Floor) -> Refusal | None:
+def _elsewhere(order: Order, floor: Floor, in_reach_m: float) -> Refusal | None:
+    for node in order.nodes:
+        here, told = floor.at_m.get(node.node_id), node.node_position
+        if here is not None and told is not None and not is_within(told, *here, in_reach_m):
+            what = f"node {node.node_id} lies at {here[0]:g}, {here[1]:g} m, not at {told.x:g}, {told.y:g} m"
+            return Refusal(ErrorType.NO_ROUTE_TO_TARGET, what, (("nodeId", node.node_id),))
+    return None
+
+
+def is_within(told: NodePosition, x: float, y: float, in_reach_m: float) -> bool:
+    """Whether a place is so near a node's, or within the deviation that is allowed from that."""
+    dx, dy = x - told.x, y - told.y
+    if math.hypot(dx, dy) <= in_reach_m:
+        return True
+    allowed = told.allowed_deviation_xy
+    if allowed is None or not allowed.a or not allowed.b:
+        return False
+    c, s = math.cos(allowed.theta), math.sin(allowed.theta)
+    return ((c * dx + s * dy) / allowed.a) ** 2 + ((c * dy - s * dx) / allowed.b) ** 2 <= 1.0
+
+
+def _no_way(order: Order, floor: Floor, next_to: Collection[str]) -> Refusal | None:
     names: Sequence[str] = [node.node_id for node in order.nodes]
     for name in names[1:]:
         if name not in floor.nodes:
             return Refusal(ErrorType.NO_ROUTE_TO_TARGET, f"there is no node {name!r}", (("nodeId", name),))
     for start, end in itertools.pairwise(names):
-        # where the first node is no place of the floor, the drone stands there: on the way to the next
-        if start in floor.nodes and start != end and (start, end) not in floor.ways:
+        # where the first node is no place of the floor, the drone is there
+        is_open = start == end or (start, end) in floor.ways if start in floor.nodes else end in next_to
+        if not is_open:
             what = f"no open way leads from {start} to {end}"
             return Refusal(ErrorType.NO_ROUTE_TO_TARGET, what, (("nodeId", end),))
     return None

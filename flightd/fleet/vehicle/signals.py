@@ -64,7 +64,19 @@ class Progress:
     result: str | None = None
 
 
-Input = Order | InstantActions | Malformed | Situation | Reached | Progress
+Said = Order | InstantActions | Malformed
+"""What a fleet control says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """A message that is not obeyed, whatever else holds: it is refused, unless it is here already."""
+
+    message: Order | InstantActions
+    refusal: Refusal
+
+
+Input = Said | Missed | Situation | Reached | Progress
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
+from flightd.adapters.ground_link.messages.counts import NodeCount
 from flightd.adapters.ground_link.messages.floor import FloorLine, FloorNode, FloorPad, FloorStatus
 from flightd.fleet.vehicle.floor import Floor
 from flightd.site.site import Side
@@ -27,7 +28,8 @@ def floor_of_link(floor: FloorStatus) -> Floor:
         node.id: {side: _levels(node, side) if told else None for side in sides.get(node.aisle, ())}
         for node in floor.nodes
     }
-    return Floor(floor.name, frozenset(shelves), frozenset(open_ways(floor)), shelves)
+    at_m = {node.id: (node.x_m, 0.0 - node.y_m) for node in floor.nodes}
+    return Floor(floor.name, frozenset(shelves), frozenset(open_ways(floor)), shelves, at_m)
 
 
 def _levels(node: FloorNode, side: Side) -> frozenset[int] | None:
@@ -41,9 +43,13 @@ def node_of_pad(floor: FloorStatus, pad: FloorPad) -> str:
 
 
 class WaysHome:
-    """The metres of ways on a floor, and of those from their ends to the nearest charge pad."""
+    """The metres of ways on a floor, and of those from their ends to the nearest charge pad; and the shelves
+    that are counted on them."""
 
     def __init__(self, floor: FloorStatus) -> None:
+        self._levels = {
+            (node.id, side): _levels(node, side) or frozenset() for node in floor.nodes for side in Side
+        }
         self._at = {node.id: (node.x_m, node.y_m) for node in floor.nodes}
         landed = [node_of_pad(floor, pad) for pad in floor.pads if pad.charge and not pad.shared]
         landed = landed or [floor.home]
@@ -55,14 +61,27 @@ class WaysHome:
                 first = 0.0 if before == _PADS else self._apart_m(before, node)
                 self._home_m[node] = self._home_m[before] + first
 
-    def there_and_home_m(self, here: str, nodes: Sequence[str]) -> Iterator[float]:
+    def there_and_home_m(
+        self, here: str, nodes: Sequence[str], at_m: tuple[float, float] | None = None
+    ) -> Iterator[float]:
         """For each of the nodes: from `here` along all before it to it, and home; infinite where no way leads
-        home."""
-        gone_m = 0.0
-        for before, node in itertools.pairwise((here, *nodes)):
-            known = before in self._at and node in self._at
-            gone_m += self._apart_m(before, node) if known else math.inf
+        home.  Where `here` is no node, the drone is at `at_m` (None: that is not known)."""
+        gone_m, last_m = 0.0, self._at.get(here, at_m)
+        for node in nodes:
+            next_m = self._at.get(node)
+            gone_m += math.inf if last_m is None or next_m is None else math.dist(last_m, next_m)
+            last_m = next_m
             yield gone_m + self._home_m.get(node, math.inf)
+
+    def shelves(self, counts: Iterable[NodeCount]) -> int:
+        """At how many levels of sides of nodes places are counted, each once."""
+        found: set[tuple[str, Side, int]] = set()
+        for one in counts:
+            for side in Side:
+                here = self._levels.get((one.node, side), frozenset())
+                levels = here.intersection(one.levels) if one.levels else here
+                found |= {(one.node, side, level) for level in levels if one.side in {"", side}}
+        return len(found)
 
     def _apart_m(self, a: str, b: str) -> float:
         return math.dist(self._at[a], self._at[b])

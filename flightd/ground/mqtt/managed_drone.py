@@ -18,10 +18,9 @@ from typing import Any, Final
 
 from flightd.adapters.ground_link.messages.floor import FloorStatus
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
-from flightd.core.errors import FlightdError, RunError
+from flightd.core.errors import FlightdError
 from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.fleet.vda5050.codec import Version
-from flightd.fleet.vda5050.errors import ErrorType, level_of
 from flightd.fleet.vda5050.factsheet import Factsheet
 from flightd.fleet.vda5050.order import Node, Order
 from flightd.fleet.vda5050.parts import Header
@@ -38,16 +37,21 @@ from flightd.fleet.vehicle.signals import (
     Input,
     Output,
     PauseAction,
+    Progress,
     Reached,
     ResumeAction,
+    Said,
 )
 from flightd.ground.drone_link import DroneLink
 from flightd.ground.messages import Act, LinkState
+from flightd.ground.mqtt.audit_words import act_in_words, decision_in_words
+from flightd.ground.mqtt.drone_trouble import of_refusal, unreachable
 from flightd.ground.mqtt.kept_session import KeptSession, StationBefore
 from flightd.ground.mqtt.linked_floor import WaysHome, floor_of_link
+from flightd.ground.mqtt.manager_inbox import ManagerInbox
 from flightd.ground.mqtt.order_flight import CommandNext, Next, PlanNext, Stuck, Wish, next_act, reached
-from flightd.ground.mqtt.reported_drone import situation_of, takes_orders
-from flightd.ground.mqtt.safe_return import SafeReturn, Standing
+from flightd.ground.mqtt.reported_drone import ChargeTrend, situation_of, takes_orders
+from flightd.ground.mqtt.safe_return import SafeReturn, Standing, ask_standing
 from flightd.ground.mqtt.sent_commands import SentCommands
 from flightd.ground.mqtt.shelf_counts import ShelfCounts, counts_of, levels_of
 
@@ -57,7 +61,6 @@ _STEP_S: Final = 0.1
 _SILENT_S: Final = 3.0
 _SAME_AGAIN_S: Final = 1.0
 _ASK_AGAIN_S: Final = 2.0
-_MOST_WAITING: Final = 32
 _MOST_WORDS: Final = 300
 _MOST_PLANS: Final = 16
 _COMMANDS: Final = frozenset(CommandKind)
@@ -117,25 +120,26 @@ class ManagedDrone:
         """It was started anew: what was ordered before is over."""
         self._heard = self._waited = False
         """The station hears it; it stood before a flight, by its last status."""
-        self._asked: deque[Input] = deque(maxlen=_MOST_WAITING)
-        self.dropped = 0
-        """Messages that came faster than they were taken."""
+        self._inbox, self._counts = ManagerInbox(name), ShelfCounts()
+        self._progress: list[Progress] = []
+        """Of the order's actions, at most one each."""
         self._link: DroneLink | None = None
         self._taken = False
         self._sent = SentCommands()
         self._event_seq: int | None = None
         self._standing: Standing | None = None
+        self._stood: Standing | None = None
+        """As it told before its newest flight."""
         self._asked_at_s = -_ASK_AGAIN_S
-        self._return = SafeReturn()
+        self._return, self._charge = SafeReturn(), ChargeTrend()
         self._acting: asyncio.Task[None] | None = None
         self._did: tuple[Next, float, int] = (None, 0.0, 0)
         """The last act, when it was answered, and the status by which it shows."""
         self._order: Order | None = None
         self._ahead: list[str] = []
-        self._counts = ShelfCounts()
         self._plans: deque[str] = deque(maxlen=_MOST_PLANS)
         self._planned: tuple[str, PlanNext] | None = None
-        self._trouble: tuple[ErrorType, str] | None = None
+        self._trouble: Error | None = None
         self._rests_since_s: float | None = None
         self._before = StationBefore()
 
@@ -188,7 +192,7 @@ class ManagedDrone:
     def trouble(self) -> str:
         """What keeps it from going on with its order, as long as it does: what it refuses, or is not sent
         to."""
-        return self.vehicle.held_back if self._trouble is None else self._trouble[1]
+        return self.vehicle.held_back if self._trouble is None else self._trouble.error_description or ""
 
     @property
     def floor(self) -> FloorStatus | None:
@@ -208,10 +212,9 @@ class ManagedDrone:
                 link: LinkState = value
                 self._heard = link.connected and link.heard_s is not None and link.heard_s < _SILENT_S
 
-    def hear(self, one: Input) -> None:
+    def hear(self, one: Said) -> None:
         """What the broker says."""
-        self.dropped += len(self._asked) == _MOST_WAITING
-        self._asked.append(one)
+        self._inbox.hear(one, asyncio.get_running_loop().time())
 
     def taken_by_person(self, taken: bool = True) -> None:
         """A person commands the drone from now on, or gives it back."""
@@ -229,10 +232,10 @@ class ManagedDrone:
             return
         self.vehicle.change_floor(floor_of_link(welcome["floor"]))
         self._ways = WaysHome(welcome["floor"])
-        self._status = self._standing = self._event_seq = None
+        self._status = self._standing = self._stood = self._event_seq = None
         self._is_new, self.is_automatic, self._waited = True, False, False
         self._asked_at_s = -_ASK_AGAIN_S
-        self._return = SafeReturn()
+        self._return, self._charge = SafeReturn(), ChargeTrend()
         self._counts.given = ()
         self._sent.clear()
         if kept := self._before.greet(str(welcome["session"])):
@@ -255,7 +258,7 @@ class ManagedDrone:
         act = self._did[0]
         if isinstance(act, CommandNext) and act.node and event.level is EventLevel.WARNING:
             refused = event.name == "command" and event.text.startswith(f"{act.kind} {act.node} refused")
-            self._trouble = (ErrorType.NODE_UNREACHABLE, event.text) if refused else self._trouble
+            self._trouble = unreachable(act.node, event.text) if refused else self._trouble
             if refused and act.counts is not None:
                 self._counts.forget(act.node)
         is_command = event.name == "command" and event.level is EventLevel.INFO
@@ -275,6 +278,7 @@ class ManagedDrone:
             while True:
                 if self._heard and self._status is not None and self._welcome is not None:
                     self._step(self._status, loop.time(), tasks)
+                self._inbox.see_late(loop.time())
                 await asyncio.sleep(_STEP_S)
 
     def take_messages(self) -> list[Header]:
@@ -297,17 +301,21 @@ class ManagedDrone:
         assert self._welcome is not None
         before, self._waited = self._waited, status.phase is Phase.PREFLIGHT
         if self._waited and not before:  # maybe on another pad than it stood on
-            self._standing, self._return = None, SafeReturn()
+            self._stood, self._standing = self._standing or self._stood, None
+            self._return = SafeReturn()
         arrived = self._arrived(status)
-        asked = [self._asked.popleft() for _ in range(len(self._asked))]
+        progress, self._progress = self._progress, []
         if self._before.flies_on and status.plan.startswith(_OURS) and status.plan not in self._plans:
             # handed over after the station before wrote down for the last time
             self._plans.append(status.plan)
         mode = OperatingMode.MANUAL if self._is_new else self._mode(status)
         self._is_new = False
         last, floor = self.vehicle.last_node, self._welcome["floor"]
-        seen = situation_of(status, floor, mode, last, self.stands_on, self._troubles())
-        for one in self.vehicle.step(self.now(), [seen, *arrived, *asked]):
+        pad, dropped = self.stands_on, self._inbox.dropped
+        charging = self._charge.see(status, floor, pad)
+        errors = [] if self._trouble is None else [self._trouble]
+        seen = situation_of(status, floor, mode, last, pad, errors, charging=charging, dropped=dropped)
+        for one in self.vehicle.step(self.now(), [seen, *arrived, *progress, *self._inbox.take(now_s)]):
             self._take_output(one, status)
         self._ahead = list(self.vehicle.ahead)
         self._see_wanted()
@@ -351,7 +359,7 @@ class ManagedDrone:
             case Begin(action):
                 node, tells = self.vehicle.last_node, self._takes_counts
                 failed = self._counts.begin(action, node, status, self._standing, tells=tells)
-                self._asked.extend([failed] if failed is not None else [])
+                self._progress += [] if failed is None else [failed]
             case Abort(action_id):
                 self._counts.abort(action_id)
             case PauseAction(action_id) | ResumeAction(action_id):
@@ -364,15 +372,9 @@ class ManagedDrone:
     def _decided(self, one: Decided) -> None:
         self._trouble = None
         self.on_decided(one)
-        if isinstance(one.about, Order):
-            if one.refusal is None:
-                self._order = one.about
-            nodes = " ".join(n.node_id if n.released else f"({n.node_id})" for n in one.about.nodes)
-            what = f"order {one.about.order_id}/{one.about.order_update_id}: {nodes}"
-        else:
-            what = f"{one.about.action_type} {one.about.action_id}"
-        refused = "" if one.refusal is None else f"{one.refusal.error}: {one.refusal.what}"
-        self._write_down(what, refused)
+        if isinstance(one.about, Order) and one.refusal is None:
+            self._order = one.about
+        self._write_down(*decision_in_words(one))
 
     def _write_down(self, what: str, refused: str) -> None:
         if self._rules is not None:
@@ -394,21 +396,19 @@ class ManagedDrone:
         """Begin what is to be done next, one thing after the other."""
         if self._acting is not None and not self._acting.done():
             return
-        over = self._counts.over()
+        over = self._counts.over(now_s)
         waits = status.phase is Phase.PREFLIGHT and CommandKind.PLAN in status.possible
         asks = waits and (self._standing is None or self._return.is_due(now_s))
         if over:
-            self._acting = tasks.create_task(self._ask_count(over, link), name=f"{self._name} counted")
+            asked = self._ask_count(over, now_s, link)
+            self._acting = tasks.create_task(asked, name=f"{self._name} counted")
         elif asks and now_s - self._asked_at_s >= _ASK_AGAIN_S:
             self._asked_at_s = now_s
             self._acting = tasks.create_task(self._ask(now_s, link), name=f"{self._name} is asked")
         else:
             act = self._homeward(status, now_s) or next_act(status, self._wish, self._planned)
             if isinstance(act, Stuck):
-                self._trouble = (
-                    ErrorType.NODE_UNREACHABLE,
-                    f"the drone was halted on its way to {act.towards}",
-                )
+                self._trouble = unreachable("", f"the drone was halted on its way to {act.towards}")
             elif act is None:
                 self._trouble = None
             elif self._is_due(act, status, now_s):
@@ -433,9 +433,8 @@ class ManagedDrone:
     async def _ask(self, now_s: float, link: DroneLink) -> None:
         """Where it stands, and how far it could fly."""
         try:
-            if self._standing is None:
-                own = await link.plan_flight((), (), dry=True, waits=True, by_person=False)
-                self._standing = Standing.of(own)
+            if self._standing is None and self._ways is not None:
+                self._standing = await ask_standing(link, self._ways, self._stood)
                 self._asked_at_s = -_ASK_AGAIN_S
             if self._return.is_due(now_s):
                 await self._return.ask(link, now_s)
@@ -443,9 +442,10 @@ class ManagedDrone:
         except FlightdError as err:
             _LOG.info("%s: %s", self._name, err)
 
-    async def _ask_count(self, over: list[str], link: DroneLink) -> None:
+    async def _ask_count(self, over: list[str], now_s: float, link: DroneLink) -> None:
         """Tell what was counted."""
-        self._asked.extend(await self._counts.results(over, link))
+        told = await self._counts.results(over, link, now_s)
+        self._progress += told  # a step may have taken the others meanwhile
 
     async def _do(self, act: PlanNext | CommandNext, status: StatusReport, link: DroneLink) -> None:
         act_id = f"{_OURS}{uuid.uuid4().hex}"
@@ -481,16 +481,9 @@ class ManagedDrone:
             self._trouble = self._trouble if act == self._did[0] else None
         except FlightdError as err:
             refused = str(err).removeprefix("refused: ")
-            self._trouble = ErrorType.NODE_UNREACHABLE, refused
-            if isinstance(err, RunError):
+            if (trouble := of_refusal(act, err)) is not None:
+                self._trouble = trouble
                 self._sent.refused(text)
         newest = status if self._status is None else self._status
         self._did = act, asyncio.get_running_loop().time(), newest.seq + 2
-        detail = ", ".join(act.nodes) if isinstance(act, PlanNext) else "onto its pad" if act.lands else ""
-        self._write_down(f"{text} {detail}".rstrip(), refused)
-
-    def _troubles(self) -> list[Error]:
-        if self._trouble is None:
-            return []
-        kind, what = self._trouble
-        return [Error(error_type=kind, error_level=level_of(kind), error_description=what)]
+        self._write_down(act_in_words(act), refused)

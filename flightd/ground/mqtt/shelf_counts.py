@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from flightd.adapters.ground_link.messages.counts import Counts, NodeCount
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
-from flightd.core.errors import FlightdError
+from flightd.core.errors import FlightdError, InputError
 from flightd.fleet.vda5050.order import Order
 from flightd.fleet.vda5050.parts import Action
 from flightd.fleet.vda5050.state import ActionStatus
@@ -20,6 +20,9 @@ from flightd.ground.mqtt.order_flight import WAITS
 from flightd.ground.mqtt.safe_return import Standing
 
 _MOST_VISITS = 32
+_AGAIN_S = 2.0
+_MOST_ASKED = 10
+"""A drone that has not told by then what it counted does not tell."""
 
 
 @dataclass(slots=True)
@@ -33,7 +36,7 @@ class _Count:
     since_ns: int | None
     held: bool = False
     seen: bool = False
-    """The visit is over; what was counted is being asked for."""
+    """The visit is over; what was counted is asked for."""
 
 
 class ShelfCounts:
@@ -41,6 +44,8 @@ class ShelfCounts:
 
     def __init__(self) -> None:
         self._counts: dict[str, _Count] = {}
+        self._asked_at_s = -math.inf
+        self._asked_in_vain = 0
         self._visits: deque[EventReport] = deque(maxlen=_MOST_VISITS)
         self.wanted: Counts = None
         """What the order wants counted, by the last step; None for a drone that is not told so."""
@@ -99,27 +104,39 @@ class ShelfCounts:
         """A node was visited."""
         self._visits.append(event)
 
-    def over(self) -> list[str]:
-        """The ids of those that are over and were not asked for before."""
-        found = []
-        for action_id, count in self._counts.items():
+    def over(self, now_s: float) -> list[str]:
+        """The ids of those that are over and of which the drone is to be asked now."""
+        for count in self._counts.values():
             since_ns = math.inf if count.since_ns is None else count.since_ns
             visits = (one for one in self._visits if one.text == count.node)
-            if not count.seen and any(one.stamp_ns > since_ns for one in visits):
-                count.seen = True
-                found.append(action_id)
-        return found
+            count.seen |= any(one.stamp_ns > since_ns for one in visits)
+        if self._asked_in_vain and now_s - self._asked_at_s < _AGAIN_S:
+            return []
+        return [action_id for action_id, count in self._counts.items() if count.seen]
 
-    async def results(self, over: Iterable[str], link: DroneLink) -> list[Progress]:
-        """What was counted, as far as the drone tells it."""
+    async def results(self, over: Iterable[str], link: DroneLink, now_s: float) -> list[Progress]:
+        """What was counted; nothing where the drone is to be asked again."""
+        self._asked_at_s = now_s
+        rows: tuple[dict[str, str], ...] = ()
+        failure = ""
+        self._asked_in_vain += 1
         try:
             rows = await link.inventory()
-        except FlightdError:
-            rows = ()
+        except InputError:
+            pass  # it keeps no inventory
+        except FlightdError as err:
+            if self._asked_in_vain < _MOST_ASKED:
+                return []
+            failure = f"the drone does not tell what it counted: {err}"
+        self._asked_in_vain = 0
         told = []
         for action_id in over:
             count = self._counts.pop(action_id, None)
-            if count is not None:
+            if count is None:
+                continue  # it was left off meanwhile
+            if failure:
+                told.append(Progress(action_id, ActionStatus.FAILED, failure))
+            else:
                 result = counted_in_words(rows, count.node, count.scan)
                 told.append(Progress(action_id, ActionStatus.FINISHED, result))
         return told

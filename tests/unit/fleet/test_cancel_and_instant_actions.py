@@ -220,13 +220,25 @@ def test_an_unknown_instant_action_fails_until_one_is_accepted(version: Version)
     assert drone.errors == []
 
 
-def test_finished_instant_actions_are_told_until_they_are_cleared_and_never_without_end() -> None:
-    drone = Drone(V3)
-    for i in range(100):
+@BOTH
+def test_finished_instant_actions_are_told_until_they_are_cleared_and_not_dropped_without_a_word(
+    version: Version,
+) -> None:
+    drone = Drone(version)
+    for i in range(47):
+        drone.say(instant("stateRequest", f"r{i}"))
+    assert drone.errors == []
+    for i in range(47, 64):
+        drone.say(instant("stateRequest", f"r{i}"))
+        assert drone.errors == ["INSTANT_ACTION_STATES_FULL"]
+    assert drone.state.errors[0].error_level == "URGENT"
+    assert "told no more" not in (drone.state.errors[0].error_description or "")
+    for i in range(64, 100):
         drone.say(instant("stateRequest", f"r{i}"))
     assert len(drone.state.instant_action_states) == 64
-    drone.say(instant("clearInstantActions", "c"))
-    assert drone.statuses == {"c": "FINISHED"}
+    assert (drone.state.errors[0].error_description or "").endswith("the oldest 36 are told no more")
+    drone.say(instant("clearInstantActions", "c") if version is V3 else order("A1 A2"))
+    assert (drone.errors, drone.statuses) == ([], {"c": "FINISHED"} if version is V3 else {})
 
 
 @BOTH

@@ -8,10 +8,14 @@ import msgspec
 import pytest
 
 from flightd.fleet.vda5050.codec import MalformedError, Version, encoded
+from flightd.fleet.vda5050.errors import ErrorType
+from flightd.fleet.vda5050.order import AllowedDeviation, OrientationType
 from flightd.fleet.vda5050.parts import Action, BlockingType, Trajectory
 from flightd.fleet.vda5050.state import ActionStatus, OperatingMode
+from flightd.fleet.vehicle.refusals import Refusal
 from flightd.fleet.vehicle.signals import (
     Malformed,
+    Missed,
     Progress,
     Reached,
 )
@@ -40,21 +44,94 @@ def test_a_malformed_order_is_told_until_an_order_is_accepted(version: Version) 
     assert drone.errors == []
 
 
-@BOTH
 @pytest.mark.parametrize(
-    "field", ["trajectory", "minimum_load_handling_device_height", "direction", "maximum_speed"]
+    ("field", "value", "in_2_1", "in_3_0"),
+    [
+        ("trajectory", Trajectory(control_points=[]), "trajectory", "trajectory"),
+        ("direction", "left", "direction", "direction"),
+        (
+            "minimum_load_handling_device_height",
+            1.0,
+            "minHeight",
+            "minimumLoadHandlingDeviceHeight",
+        ),
+        ("maximum_speed", 1.0, "maxSpeed", "maximumSpeed"),
+        ("orientation", 0.0, "orientation", "orientation"),
+        ("max_rotation_speed", 1.0, "maxRotationSpeed", "maxRotationSpeed"),
+        ("reach_orientation_before_entering", True, "rotationAllowed", "reachOrientationBeforeEntering"),
+    ],
 )
 def test_an_order_with_a_field_that_cannot_be_used_is_refused_by_its_name(
-    version: Version, field: str
+    field: str, value: Any, in_2_1: str, in_3_0: str
 ) -> None:
-    value = {"trajectory": Trajectory(control_points=[]), "direction": "left"}.get(field, 1.0)
+    for version, name in ((V2, in_2_1), (V3, in_3_0)):
+        drone = Drone(version)
+        more: dict[str, Any] = {field: value}
+        drone.say(order("A1 A2", **more))
+        assert drone.errors == ["UNSUPPORTED_PARAMETER"]
+        assert drone.state.errors[0].error_level == "CRITICAL"
+        assert drone.about("parameter") == [f"edges[0].{name}"]
+        assert (drone.state.errors[0].error_description or "").startswith(f"edges[0].{name} cannot be ")
+        assert drone.state.order_id == ""
+
+
+@BOTH
+def test_fields_that_ask_for_nothing_are_taken(version: Version) -> None:
     drone = Drone(version)
-    more: dict[str, Any] = {field: value}
-    drone.say(order("A1 A2", **more))
-    assert drone.errors == ["UNSUPPORTED_PARAMETER"]
-    assert drone.state.errors[0].error_level == "CRITICAL"
-    assert drone.about("parameter") == [f"edges[0].{field}"]
-    assert drone.state.order_id == ""
+    more: dict[str, Any] = {
+        "maximum_speed": 2.0,
+        "length": 1.5,
+        "reach_orientation_before_entering": False,
+        "orientation_type": OrientationType.TANGENTIAL,
+    }
+    told = order("A1 A2", **more)
+    drone.say(at(told, 1, x=1.5, y=0.0, map_id="demo", theta=1.0, allowed_deviation_theta=3.1415))
+    assert drone.errors == []
+
+
+@BOTH
+def test_an_orientation_that_the_drone_has_is_kept_and_no_other_one(version: Version) -> None:
+    where = {"x": 0.0, "y": 0.0, "map_id": "demo"}
+    for theta, allowed, is_so in (
+        (1.1, None, True),
+        (1.5, None, False),
+        (1.5, 0.6, True),
+        (-3.0, None, False),
+    ):
+        drone = Drone(version)
+        drone.is_at("A1", at_m=(0.0, 0.0), theta=1.0)
+        drone.say(at(order("A1 A2"), theta=theta, allowed_deviation_theta=allowed, **where))
+        assert drone.errors == ([] if is_so else ["UNSUPPORTED_PARAMETER"]), theta
+    drone.say(at(order("A1 A2", name="other"), 1, x=1.5, y=0.0, map_id="demo", theta=1.0))
+    assert drone.about("parameter") == ["nodes[1].nodePosition.theta"]
+
+
+@BOTH
+def test_a_node_that_lies_elsewhere_on_the_floor_is_refused(version: Version) -> None:
+    wide = AllowedDeviation(a=3.0, b=3.0, theta=0.0)
+    for index, x, more, goes in (
+        (1, 1.6, {}, True),
+        (1, 2.7, {}, False),
+        (1, 2.7, {"allowed_deviation_xy": wide}, True),
+        (0, 5.0, {}, False),
+    ):
+        drone = Drone(version)
+        drone.say(at(order("A1 A2"), index, x=x, y=0.0, map_id="demo", **more))
+        assert drone.errors == ([] if goes else ["NO_ROUTE_TO_TARGET"]), x
+        assert drone.about("nodeId") == ([] if goes else [f"A{index + 1}"])
+
+
+@BOTH
+def test_a_first_node_of_nowhere_leads_on_along_the_way_that_the_drone_is_on(version: Version) -> None:
+    for way, goes in (("A3 A4", True), ("A2 A1", True), ("A1", False), ("A4", False), ("B2", False)):
+        drone = Drone(version)
+        drone.is_at(None, at_m=(2.1, 0.1))
+        drone.say(at(order(f"here {way}"), x=2.1, y=0.0, map_id="demo"))
+        assert drone.errors == ([] if goes else ["NO_ROUTE_TO_TARGET"]), way
+    drone = Drone(version)
+    drone.is_at("A1", at_m=(0.0, 0.0))
+    drone.say(at(order("here B1 B2"), x=0.0, y=0.0, map_id="demo"))
+    assert drone.errors == []
 
 
 @BOTH
@@ -169,8 +246,25 @@ def test_no_order_is_taken_in_a_mode_that_does_not_allow_it(version: Version) ->
         assert (drone.errors == []) == (mode in allowed), mode
         if mode not in allowed:
             assert drone.errors == ["MOBILE_ROBOT_NOT_AVAILABLE"]
+            other = OperatingMode.MANUAL if mode is OperatingMode.SERVICE else OperatingMode.SERVICE
+            drone.is_at("A1", mode=other)
+            assert drone.errors == ["MOBILE_ROBOT_NOT_AVAILABLE"]
             drone.is_at("A1")
             assert drone.errors == []  # until the mode allows new orders
+
+
+@BOTH
+def test_an_order_that_was_missed_is_refused_unless_it_is_here_already(version: Version) -> None:
+    drone = Drone(version)
+    late = Refusal(ErrorType.DRONE_NOT_HEARD, "nobody heard")
+    drone.say(Missed(order("A1 A2"), late))
+    assert (drone.errors, drone.about("orderId"), drone.state.order_id) == (["DRONE_NOT_HEARD"], ["o"], "")
+    assert (b'"orderError"' in encoded(drone.state, version)) is (version is V2)
+    drone.say(order("A1 A2"))
+    drone.say(Missed(order("A1 A2"), late))
+    assert drone.errors == []
+    drone.say(Missed(order("A2 A3", number=1, first=2), late))
+    assert (drone.errors, drone.ahead) == (["DRONE_NOT_HEARD"], "A2")
 
 
 @BOTH

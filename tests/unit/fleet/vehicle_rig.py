@@ -76,7 +76,8 @@ def floor_of(site: Site) -> Floor:
         }
         for node in site.nodes.values()
     }
-    return Floor(site.name, frozenset(site.nodes), frozenset(ways), shelves)
+    at_m = {node.id: (node.x_m, 0.0 - node.y_m) for node in site.nodes.values()}
+    return Floor(site.name, frozenset(site.nodes), frozenset(ways), shelves, at_m)
 
 
 def scan(name: str, blocking: BlockingType = BlockingType.HARD, **more: Any) -> Action:
@@ -163,11 +164,12 @@ class Drone:
         driving: bool = False,
         mode: OperatingMode = OperatingMode.AUTOMATIC,
         at_m: tuple[float, float] | None = None,
+        theta: float = 0.0,
     ) -> list[Output]:
         """Say how the drone is."""
         where = None
         if at_m is not None:
-            where = MobileRobotPosition(x=at_m[0], y=at_m[1], theta=0.0, map_id=site().name, localized=True)
+            where = MobileRobotPosition(x=at_m[0], y=at_m[1], theta=theta, map_id=site().name, localized=True)
         return self.say(Situation(mode=mode, driving=driving, power=POWER, node=node, position=where))
 
     @property
@@ -219,7 +221,8 @@ def flown(out: Sequence[Output]) -> str:
     return " ".join(stop.node for stop in only(out, Fly)[-1].stops)
 
 
-def at(told: Order, **where: Any) -> Order:
-    """The order with a position of its first node."""
-    first = msgspec.structs.replace(told.nodes[0], node_position=NodePosition(**where))
-    return msgspec.structs.replace(told, nodes=[first, *told.nodes[1:]])
+def at(told: Order, index: int = 0, **where: Any) -> Order:
+    """The order with a position of its first node, or of another one."""
+    nodes = [*told.nodes]
+    nodes[index] = msgspec.structs.replace(nodes[index], node_position=NodePosition(**where))
+    return msgspec.structs.replace(told, nodes=nodes)

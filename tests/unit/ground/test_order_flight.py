@@ -14,7 +14,7 @@ import pytest
 from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.adapters.ground_link.messages.counts import NodeCount
 from flightd.adapters.ground_link.messages.floor import FloorWay
-from flightd.adapters.ground_link.messages.published import EventReport, LinkReport, Position, StatusReport
+from flightd.adapters.ground_link.messages.published import EventReport, Position
 from flightd.core.errors import InputError
 from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.fleet.vda5050.codec import Version
@@ -33,25 +33,12 @@ from flightd.site.site import Side
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import virtual
 from tests.unit.fleet.vehicle_rig import floor_of, order, scan
+from tests.unit.ground.managed_rig import IN_AIR, Link, status
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
 RACKS = load_site(CONFIGS / "site-racks-small.toml")
-IN_AIR = (CommandKind.PAUSE, CommandKind.RESUME, CommandKind.GOTO, CommandKind.HOME)
 GOTO, PAUSE, RESUME = CommandKind.GOTO, CommandKind.PAUSE, CommandKind.RESUME
-
-
-def status(phase: Phase, way: str = "", **more: Any) -> StatusReport:
-    """A drone in this phase, with this way ahead."""
-    nodes = tuple(way.split())
-    waits = phase is Phase.PREFLIGHT
-    possible = (CommandKind.PLAN, CommandKind.START) if waits else IN_AIR
-    return StatusReport(
-        version=1, session="s", phase=phase, reason="", node="", goal=(nodes or ("",))[0],
-        nodes_done=0, nodes_planned=0, height_m=None, lines=(), lines_age_s=None, vehicle=None,
-        frames=0, frames_dropped=0, fps=0.0, latency_ms={}, link=LinkReport(0, 0, 0, 0, 0), way=nodes,
-        **{"seq": 1, "stamp_ns": 1, "possible": possible, "plan": "p", "position": None, **more},
-    )  # fmt: skip
 
 
 def nodes(text: str) -> tuple[str, ...]:
@@ -269,38 +256,6 @@ def test_a_command_is_the_managers_once_and_as_long_as_it_can_take_effect() -> N
     sent.note("pause", 20_000_000_000)
     sent.refused("pause")
     assert not sent.take(pause(21.0))
-
-
-class Link:
-    """A drone's link that takes everything, and notes it."""
-
-    def __init__(self) -> None:
-        self.asked: list[str] = []
-        self.counts: list[Any] = []
-        self.levels: tuple[int, ...] = ()
-
-    async def plan_flight(
-        self,
-        asked: tuple[str, ...],
-        levels: tuple[int, ...] = (),
-        *_: Any,
-        dry: bool = False,
-        waits: bool = False,
-        counts: Any = None,
-        **__: Any,
-    ) -> Any:
-        self.counts.append(counts)
-        self.levels = self.levels if dry else levels
-        self.asked += [] if dry else [f"plan {' '.join(asked)}{', to wait there' * waits}"]
-        told = {"batteries": 1, "way": ("A1", "A2"), "places": 1, "sweeps": (), "seconds": 9.0, "way_m": 9.0}
-        return type("Planned", (), told)
-
-    async def act(self, act: Any, *, counts: Any = None, **_: Any) -> None:
-        self.asked.append(act.command.value)
-        self.counts.append(counts)
-
-    async def inventory(self) -> tuple[dict[str, str], ...]:
-        return ()
 
 
 @pytest.mark.parametrize("knows", [True, False])

@@ -129,6 +129,13 @@ def test_a_plan_comes_with_its_nodes_and_only_a_start_names_one() -> None:
     assert command.plan == "plan-0001"
 
 
+def test_a_goto_counts_at_its_own_node_alone() -> None:
+    rig = RequestHandlerRig()
+    told = refused(rig.order("goto", node="A2", counts=[{"node": "A2"}, {"node": "A3"}]), Code.MALFORMED)
+    assert told == "the counts of a goto are of its own node, here A2"
+    assert isinstance(rig.order("goto", node="A2", counts=[{"node": "A2"}]), Accepted)
+
+
 def test_the_largest_plan_of_usual_names_fits_into_a_request() -> None:
     nodes = tuple(f"AISLE-12.{i}" for i in range(MOST_NODES))
     levels = tuple(range(1, 10))

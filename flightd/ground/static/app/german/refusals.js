@@ -280,6 +280,7 @@ export default {
   "no open way from {start} to {goal}": "kein offener Weg von {start} nach {goal}",
   "{n} nodes": "{n} Knoten",
   "{plan}, counted on level {levels}": "{plan}, gezählt auf Ebene {levels}",
+  "{plan}, counted at {n} of them": "{plan}, gezählt an {n} davon",
   "{nodes} to stop at": "zu halten bei {nodes}",
   "{nodes} left out: {why}": "{nodes} weggelassen: {why}",
   "as configured again": "wieder wie konfiguriert",

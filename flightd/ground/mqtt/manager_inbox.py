@@ -1,0 +1,91 @@
+"""What a fleet's manager says to a drone, until the drone's next step takes it.
+
+Nothing waits for a drone that is not heard: what would send it off is refused as soon as it is heard again,
+however long that takes; what holds it back, or only asks, is taken then.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from typing import Final
+
+import msgspec
+
+from flightd.fleet.vda5050.errors import ErrorType
+from flightd.fleet.vda5050.order import InstantActions, Order
+from flightd.fleet.vehicle.refusals import Refusal
+from flightd.fleet.vehicle.signals import Input, Missed, Said
+
+_LOG = logging.getLogger(__name__)
+_LATE_S: Final = 5.0
+"""As a drone's own for what is ordered by an old status."""
+_MOST_WAITING: Final = 32
+_MOST_URGENT: Final = 8
+"""Beside these."""
+_URGENT: Final = frozenset({"startPause", "cancelOrder"})
+_SEND_ON: Final = frozenset({"stopPause"})
+"""Nobody is sent on by a manager who could not know how it was."""
+_NOT_HEARD: Final = "the station did not hear the drone when this came: look, and send it again"
+_TOO_MANY: Final = f"{_MOST_WAITING} messages wait already: send it again"
+
+
+class ManagerInbox:
+    """Bounded: the newest is refused where it is full.  `dropped` counts all that was not obeyed."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._waiting: list[tuple[Said | Missed, float]] = []
+        self._beyond: Said | Missed | None = None
+        """The newest of those for which there was no room."""
+        self.dropped = 0
+
+    def hear(self, one: Said, now_s: float) -> None:
+        """It is said now."""
+        urgent = isinstance(one, InstantActions) and any(each.action_type in _URGENT for each in one.actions)
+        if len(self._waiting) < _MOST_WAITING + urgent * _MOST_URGENT:
+            self._waiting.append((one, now_s))
+            return
+        if self._beyond is None:
+            _LOG.warning("%s: more messages of its manager than are taken", self._name)
+        self.dropped += 1
+        self._beyond = one
+        if isinstance(one, Order | InstantActions):
+            self._beyond = _refused(one, ErrorType.INSUFFICIENT_MEMORY, _TOO_MANY)
+
+    def see_late(self, now_s: float) -> None:
+        """What waited for too long is not obeyed."""
+        self._waiting = [
+            (part, at_s)
+            for one, at_s in self._waiting
+            for part in (self._late(one) if now_s - at_s > _LATE_S else (one,))
+        ]
+
+    def take(self, now_s: float) -> list[Input]:
+        """What was said since, for the drone's next step."""
+        self.see_late(now_s)
+        taken: list[Input] = [one for one, _ in self._waiting]
+        if self._beyond is not None:
+            taken.append(self._beyond)
+        self._waiting, self._beyond = [], None
+        return taken
+
+    def _late(self, one: Said | Missed) -> Iterator[Said | Missed]:
+        if isinstance(one, Order):
+            self.dropped += 1
+            yield _refused(one, ErrorType.DRONE_NOT_HEARD, _NOT_HEARD)
+        elif isinstance(one, InstantActions):
+            late = [each for each in one.actions if each.action_type in _SEND_ON]
+            yield msgspec.structs.replace(one, actions=[each for each in one.actions if each not in late])
+            if late:
+                self.dropped += 1
+                of_late = msgspec.structs.replace(one, actions=late)
+                yield _refused(of_late, ErrorType.DRONE_NOT_HEARD, _NOT_HEARD)
+        else:
+            yield one
+
+
+def _refused(one: Order | InstantActions, order_error: ErrorType, what: str) -> Missed:
+    """By the standard's name for an instant action that cannot be done, or by that of an order."""
+    error = order_error if isinstance(one, Order) else ErrorType.INVALID_INSTANT_ACTION
+    return Missed(one, Refusal(error, what))
