@@ -44,6 +44,8 @@ class Link:
         self.asked: list[str] = []
         self.counts: list[Any] = []
         self.levels: tuple[int, ...] = ()
+        self.places = 1
+        """Of any plan."""
         self.fails: dict[CommandKind, FlightdError] = {}
         """What is not taken, and how that shows."""
         self.rows: tuple[dict[str, str], ...] = ()
@@ -64,8 +66,8 @@ class Link:
         self.levels = self.levels if dry else levels
         self.asked += [] if dry else [f"plan {' '.join(asked)}{', to wait there' * waits}"]
         told = {
-            "batteries": 1, "way": ("A1", "A2"), "places": 1, "sweeps": (), "seconds": 9.0, "way_m": 9.0,
-            "nodes": asked, "levels": (),
+            "batteries": 1, "way": ("A1", "A2"), "places": self.places, "sweeps": (), "seconds": 9.0,
+            "way_m": 9.0, "nodes": asked, "levels": (),
         }  # fmt: skip
         return type("Planned", (), told)
 

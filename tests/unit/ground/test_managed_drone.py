@@ -149,6 +149,22 @@ def test_a_drone_tells_before_its_start_how_long_its_counts_take() -> None:
     virtual(go())
 
 
+def test_from_a_pad_of_others_whose_way_home_counts_nothing_a_drone_still_counts() -> None:
+    demo = Managed()
+
+    async def go() -> None:
+        async with demo.flown():
+            demo.link.places = 0
+            demo.tell(Phase.LAND)
+            await asyncio.sleep(1.0)
+            demo.tell(Phase.PREFLIGHT)
+            await asyncio.sleep(1.0)
+            assert demo.drone.standing is not None
+            assert demo.drone.standing.counts
+
+    virtual(go())
+
+
 @pytest.mark.parametrize(("untold", "came"), [(3, "FINISHED"), (99, "FAILED")])
 def test_a_count_is_done_when_the_drone_told_what_it_counted(untold: int, came: str) -> None:
     demo = Managed()
