@@ -21,7 +21,7 @@ from flightd.fleet.vda5050.order import InstantActions, Order
 from flightd.fleet.vda5050.parts import Header
 from flightd.fleet.vda5050.state import Connection, ConnectionState
 from flightd.fleet.vehicle.drone_factsheet import Measures
-from flightd.fleet.vehicle.signals import Input, Malformed
+from flightd.fleet.vehicle.signals import Malformed, Said
 from flightd.ground.access.roles import Identity, Role
 from flightd.ground.hub import Hub
 from flightd.ground.mqtt.broker_address import BrokerAddress
@@ -117,7 +117,7 @@ class DroneAtBroker:
             else:
                 self._drone.hear(self._read(str(message.topic), message.payload))
 
-    def _read(self, topic: str, payload: Any) -> Input:
+    def _read(self, topic: str, payload: Any) -> Said:
         data = bytes(payload) if isinstance(payload, bytes | bytearray) else str(payload).encode()
         kind: type[Order | InstantActions] = Order if topic == self._at(Order) else InstantActions
         try:

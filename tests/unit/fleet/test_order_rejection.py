@@ -91,7 +91,7 @@ def test_fields_that_ask_for_nothing_are_taken(version: Version) -> None:
 
 @BOTH
 def test_an_orientation_that_the_drone_has_is_kept_and_no_other_one(version: Version) -> None:
-    where = {"x": 0.0, "y": 0.0, "map_id": "demo"}
+    where: dict[str, Any] = {"x": 0.0, "y": 0.0, "map_id": "demo"}
     for theta, allowed, is_so in (
         (1.1, None, True),
         (1.5, None, False),
