@@ -278,7 +278,8 @@ class ManagedDrone:
             while True:
                 if self._heard and self._status is not None and self._welcome is not None:
                     self._step(self._status, loop.time(), tasks)
-                self._inbox.see_late(loop.time())
+                else:
+                    self._inbox.see_late(loop.time())
                 await asyncio.sleep(_STEP_S)
 
     def take_messages(self) -> list[Header]:
@@ -315,7 +316,7 @@ class ManagedDrone:
         charging = self._charge.see(status, floor, pad)
         errors = [] if self._trouble is None else [self._trouble]
         seen = situation_of(status, floor, mode, last, pad, errors, charging=charging, dropped=dropped)
-        for one in self.vehicle.step(self.now(), [seen, *arrived, *progress, *self._inbox.take(now_s)]):
+        for one in self.vehicle.step(self.now(), [seen, *arrived, *progress, *self._inbox.take()]):
             self._take_output(one, status)
         self._ahead = list(self.vehicle.ahead)
         self._see_wanted()

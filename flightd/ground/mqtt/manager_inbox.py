@@ -54,16 +54,15 @@ class ManagerInbox:
             self._beyond = _refused(one, ErrorType.INSUFFICIENT_MEMORY, _TOO_MANY)
 
     def see_late(self, now_s: float) -> None:
-        """What waited for too long is not obeyed."""
+        """The drone is not heard: what waits for too long is not obeyed."""
         self._waiting = [
             (part, at_s)
             for one, at_s in self._waiting
             for part in (self._late(one) if now_s - at_s > _LATE_S else (one,))
         ]
 
-    def take(self, now_s: float) -> list[Input]:
+    def take(self) -> list[Input]:
         """What was said since, for the drone's next step."""
-        self.see_late(now_s)
         taken: list[Input] = [one for one, _ in self._waiting]
         if self._beyond is not None:
             taken.append(self._beyond)

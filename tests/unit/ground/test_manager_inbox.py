@@ -108,12 +108,12 @@ def test_who_sends_more_than_is_taken_is_told_of_the_newest() -> None:
     inbox = ManagerInbox("demo")
     for i in range(33):
         inbox.hear(order("A1 A2", number=i), 0.0)
-    *taken, beyond = inbox.take(0.0)
+    *taken, beyond = inbox.take()
     assert len(taken) == 32
     assert isinstance(beyond, Missed)
     assert (beyond.refusal.error, inbox.dropped) == ("INSUFFICIENT_MEMORY", 1)
-    assert inbox.take(0.0) == []
+    assert inbox.take() == []
     wrong = Malformed("order", MalformedError("no JSON", told={}))
     for _ in range(40):
         inbox.hear(wrong, 0.0)
-    assert inbox.take(100.0) == [wrong] * 33
+    assert inbox.take() == [wrong] * 33
