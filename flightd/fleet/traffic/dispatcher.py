@@ -3,7 +3,6 @@ what each may fly next.  Pure: a step from reports to commands."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -14,9 +13,11 @@ from flightd.fleet.traffic.dock_queue import DockQueue, Standing
 from flightd.fleet.traffic.docks import Dock
 from flightd.fleet.traffic.endurance import Endurance
 from flightd.fleet.traffic.motions import Act
+from flightd.fleet.traffic.open_ways import OpenWays
 from flightd.fleet.traffic.plan import Action, Stop
+from flightd.fleet.traffic.reach import BEYOND, NO_WAY, TRIES, Reach
 from flightd.fleet.traffic.traffic_control import TrafficControl
-from flightd.fleet.traffic.work_queue import MOST_OF_TOUR, TourTimes, WorkQueue
+from flightd.fleet.traffic.work_queue import TourTimes, WorkQueue
 
 _DOUBT_LASTS_MS: Final = 20_000
 SILENT_MS: Final = 90_000
@@ -24,13 +25,11 @@ SILENT_MS: Final = 90_000
 _PATIENCE_MS: Final = 45_000
 """Who waits so long for others is planned anew."""
 _RETRY_MS: Final = 15_000
-_TRIES: Final = 4
 _SPARE_FRAC: Final = 0.25
 """Of a tour's time: kept for delays."""
 _SPARE_MS: Final = 45_000
 _SLOWER: Final = 1.15
 """What a flight takes beside what was planned, at most on average."""
-_NO_WAY: Final = "there is no way there"
 _WITH_SPARE: Final = _SLOWER * (1 + _SPARE_FRAC)
 
 
@@ -81,8 +80,9 @@ class Dispatcher:
         self.queue = queue
         self._endurance = endurance
         self._distances = Distances(control.net)
+        self._open_ways = OpenWays(control)
         full = endurance.starts_at if full_at is None else full_at
-        self.docks = DockQueue(control, self._distances, docks, full, returns=keep_home)
+        self.docks = DockQueue(control, self._distances, self._open_ways, docks, full, returns=keep_home)
         self._level: dict[str, float] = {}
         self._charging: dict[str, bool | None] = {}
         self._charge: dict[str, float] = {}
@@ -98,6 +98,8 @@ class Dispatcher:
         self.closed: dict[str, Closure] = {}
         """What nobody flies, by name."""
         self._refusals: dict[str, int] = {}
+        self._reach = Reach()
+        queue.retry([node for node, why in queue.reasons.items() if why == BEYOND])
         self.holding = 0
 
     def step(self, now_ms: int, reports: Iterable[DroneReport]) -> Commands:
@@ -123,7 +125,7 @@ class Dispatcher:
         for closure in gone:
             del self.closed[closure.name]
             self.control.open(closure.name)
-            self._free({*closure.nodes, *(n for n, why in self.queue.reasons.items() if why == _NO_WAY)})
+            self._free({*closure.nodes, *(n for n, why in self.queue.reasons.items() if why == NO_WAY)})
         new = [closure for name, closure in wanted.items() if name not in self.closed]
         for closure in new:
             self.closed[closure.name] = closure
@@ -183,7 +185,7 @@ class Dispatcher:
 
     def _blame(self, node: str, drone: str, why: str) -> None:
         tries = self._refusals[node] = self._refusals.get(node, 0) + 1
-        if self.queue.work(node).drone or tries >= _TRIES:
+        if self.queue.work(node).drone or tries >= TRIES:
             self._refusals.pop(node)
             self.queue.give_up(node, f"{drone}: {why}")
 
@@ -253,7 +255,7 @@ class Dispatcher:
             return {}
         behind = set(self.queue.open).intersection(*map(self._behind_closed, self.control.drones))
         whys = {node: one.why for one in self.closed.values() for node in one.nodes}
-        return {node: whys.get(node, _NO_WAY) for node in self.queue.open if node in behind or node in whys}
+        return {node: whys.get(node, NO_WAY) for node in self.queue.open if node in behind or node in whys}
 
     def _behind_closed(self, drone: str) -> set[str]:
         """The nodes that wait, and from which this drone would not come home."""
@@ -261,6 +263,10 @@ class Dispatcher:
             return set()
         lanes, leads_home = self.control.lanes, self.control.closed.leads_to(self.docks.home(drone))
         return {node for node in self.queue.open if lanes.over(node) not in leads_home}
+
+    def _closed_to(self, drone: str) -> set[str]:
+        """The nodes that wait and that it is not to visit now, for what people closed."""
+        return self._behind_closed(drone).union(*(one.nodes for one in self.closed.values()))
 
     def _watch(self, drone: str, now_ms: int) -> None:
         """Home in time, round who is in doubt for long, another way for who waits for long."""
@@ -284,6 +290,9 @@ class Dispatcher:
         if course.ahead and course.stops and self._is_short(drone):
             course.stops = ()
             self._replanned([drone], now_ms)
+        if drone in self._charge:
+            spared_ms = self._endurance.left_ms(self._charge[drone]) - _SPARE_MS
+            self.docks.turn_back(drone, int(spared_ms / _SLOWER), now_ms)
         if course.base or not self.control.waits(drone):
             self._waits_since_ms.pop(drone, None)
         elif now_ms - self._waits_since_ms.setdefault(drone, now_ms) >= _PATIENCE_MS:
@@ -295,11 +304,10 @@ class Dispatcher:
         """Whether it has to leave out what it has left to count to be home with its reserve."""
         course = self.control.drones[drone]
         left_ms = self._left_ms(drone)
-        at = course.base[-1].vertex if course.base else course.place
         if self.control.lanes.vertices[course.place].pad is not None:
             return False
         base_ms = sum(action.duration_ms for action in course.base)
-        home_ms = min(self._distances.to(end)[at] for end in course.ends)
+        home_ms = self._open_ways.ms(drone, course.base_end, course.ends)
         return left_ms < _SLOWER * (base_ms + home_ms) * (1 + _SPARE_FRAC) + _SPARE_MS
 
     def _bring_home(self, now_ms: int) -> None:
@@ -321,11 +329,12 @@ class Dispatcher:
             self._replanned(flying, now_ms)
 
     def _comes_home(self, drone: str, vertex: int, after_ms: int) -> bool:
-        """Whether the battery brings a drone home from the end of a base; who is on the way home goes on."""
+        """Whether the battery brings a drone home from the end of a base; who has nothing left to count goes
+        on, home or to a dock (`DockQueue.turn_back`)."""
         course = self.control.drones[drone]
         if not course.stops:
             return True
-        home_ms = min(self._distances.to(end)[vertex] for end in course.ends)
+        home_ms = self._open_ways.ms(drone, vertex, course.ends)
         return _SLOWER * (after_ms + home_ms) <= self._left_ms(drone)
 
     def _left_ms(self, drone: str) -> int:
@@ -333,6 +342,10 @@ class Dispatcher:
         keep_ms = self.docks.keep_ms(drone)
         spare_ms = int(_WITH_SPARE * keep_ms) + _SPARE_MS if keep_ms else 0
         return self._endurance.left_ms(self._charge.get(drone, 1.0)) - spare_ms
+
+    def _budget_ms(self, drone: str) -> int:
+        """What a tour may take by the shortest ways."""
+        return int(self._left_ms(drone) / _WITH_SPARE)
 
     def _fill_batteries(self, now_ms: int) -> None:
         """As long as there is something to count with them, on the ground at least."""
@@ -372,27 +385,26 @@ class Dispatcher:
     def _fly_on(self, now_ms: int) -> None:
         """Those that were taken up in the air: with something to do, as far as their batteries last, or
         home."""
-        shared = math.ceil(len(self.queue.open) / len(self.control.drones))
         for drone in sorted(self._comes_back & self._charge.keys()):
             if self.control.drones[drone].doubt_m > 0.0:
                 continue
             self._tries.clear()  # others may still come back, whose air is closed until then
             self._comes_back.discard(drone)
-            most = min(shared, MOST_OF_TOUR) if self._shares else MOST_OF_TOUR
             may_work = bool(self.queue.open) and now_ms >= self._next_try_ms.get(drone, 0)
-            if not (may_work and self._give_tour(drone, now_ms, most)):
+            if not (may_work and self._give_tour(drone, now_ms, len(self.control.drones))):
                 self._held |= set(self.control.replan([drone], now_ms))
                 self._settle_tours()
 
     def _give_tours(self, now_ms: int) -> None:
         ready = [drone for drone in self.control.drones if self._may_begin(drone)]
         for i, drone in enumerate(ready):
+            self.queue.retry(self._reach.regained(drone, self._charge[drone]))
             if not self.queue.open or now_ms < self._next_try_ms.get(drone, 0):
                 continue
-            most = math.ceil(len(self.queue.open) / (len(ready) - i)) if self._shares else MOST_OF_TOUR
             plans = self.control.replans
-            if not self._give_tour(drone, now_ms, min(most, MOST_OF_TOUR)):
+            if not self._give_tour(drone, now_ms, len(ready) - i):
                 self._next_try_ms[drone] = now_ms + _RETRY_MS
+                self._tell_beyond(drone)
             if self._shares and self.control.replans > plans:
                 return
 
@@ -403,13 +415,14 @@ class Dispatcher:
         idle &= drone not in self._held and drone not in self._comes_back
         return idle and self._charge.get(drone, 0.0) >= self._endurance.starts_at
 
-    def _give_tour(self, drone: str, now_ms: int, most: int) -> bool:
+    def _give_tour(self, drone: str, now_ms: int, among: int) -> bool:
+        """If the work is shared, one drone's part `among` so many."""
         course, home = self.control.drones[drone], self.docks.home(drone)
-        left_ms = self._left_ms(drone)
-        budget_ms = int(left_ms / _WITH_SPARE)
+        left_ms, budget_ms = self._left_ms(drone), self._budget_ms(drone)
         busy = {self.queue.work(node).aisle for node in self.queue.given}
-        out = self._behind_closed(drone).union(*(one.nodes for one in self.closed.values()))
-        nodes = self.queue.tour(self._times(course.place, home), budget_ms, busy, most, drone, out)
+        out, times = self._closed_to(drone), self._times(course.place, home)
+        share_ms = self.queue.takes_ms(times) // among if self._shares else None
+        nodes = self.queue.tour(times, budget_ms, busy, share_ms, drone, out)
         ends = (home,)
         while nodes:
             if not self.control.give(drone, [self._stop(node) for node in nodes], ends, now_ms):
@@ -419,18 +432,35 @@ class Dispatcher:
             flight_ms = course.ahead[-1].end_ms - course.ahead[0].start_ms
             if flight_ms <= left_ms / (1 + _SPARE_FRAC):
                 self.queue.take(drone, nodes)
+                for node in nodes:
+                    self._reach.forget(node)
                 self._tours.setdefault(drone, set()).update(nodes)
                 return True
             self.control.give(drone, (), ends, now_ms)
+            if len(nodes) == 1:
+                self._reach.fails(nodes[0], drone, self._charge[drone])
             nodes = nodes[: len(nodes) * 3 // 4]
         return False
+
+    def _tell_beyond(self, drone: str) -> None:
+        """Of what waits and lies too far for every drone, now that this one was ready and went nowhere."""
+        home, control = self.docks.home(drone), self.control
+        times, budget_ms = self._times(control.drones[drone].place, home), self._budget_ms(drone)
+        drones = [each for each, course in control.drones.items() if not course.failed]
+        for node in {*self.queue.open} - self._closed_to(drone):
+            work = self.queue.work(node)
+            way_ms = times.out_ms(node) + work.dwell_ms + times.home_ms(node)
+            if work.drone in {"", drone} and way_ms > budget_ms:
+                self._reach.fails(node, drone, self._charge[drone])
+            if why := self._reach.why(node, way_ms, drones, work.drone):
+                self.queue.hand_back([node], why)
 
     def _refused(self, nodes: Sequence[str]) -> None:
         """Tell of a node to which there is no way, once that was so several times."""
         if len(nodes) == 1:
             tries = self._tries[nodes[0]] = self._tries.get(nodes[0], 0) + 1
-            if tries >= _TRIES:
-                self.queue.hand_back(nodes, _NO_WAY)
+            if tries >= TRIES:
+                self.queue.hand_back(nodes, NO_WAY)
 
     def _stop(self, node: str) -> Stop:
         lanes = self.control.lanes

@@ -15,6 +15,7 @@ from typing import Final
 from flightd.fleet.traffic.distances import Distances
 from flightd.fleet.traffic.docks import Dock, DockKind, Waiting, chosen_docks
 from flightd.fleet.traffic.drone_course import DroneCourse
+from flightd.fleet.traffic.open_ways import OpenWays
 from flightd.fleet.traffic.plan import Stop
 from flightd.fleet.traffic.traffic_control import TrafficControl
 
@@ -54,6 +55,7 @@ class DockQueue:
         self,
         control: TrafficControl,
         distances: Distances,
+        open_ways: OpenWays,
         docks: Sequence[Dock],
         full_enough: float,
         *,
@@ -62,6 +64,7 @@ class DockQueue:
         self._returns = returns
         self._control = control
         self._distances = distances
+        self._open_ways = open_ways
         self._docks = {dock.name: dock for dock in docks}
         self._full_enough = full_enough
         self._homes: dict[str, int] = {}
@@ -131,6 +134,23 @@ class DockQueue:
         if waiting:
             self._send(waiting, known, left_ms, now_ms)
 
+    def turn_back(self, drone: str, left_ms: int, now_ms: int) -> None:
+        """Let a drone that waited too long on its way to a dock go home while it can: it may fly so long
+        still, which is not enough any more to come there, and from there home."""
+        dock, course = self._dock_of(drone), self._control.drones[drone]
+        is_in_air = self._control.lanes.vertices[course.place].pad is None
+        if dock is None or not course.tail or course.ahead[-1].vertex != dock.place or not is_in_air:
+            return
+        home = (self.home(drone),)
+        base_ms = sum(action.duration_ms for action in course.base)
+        back_ms = self._open_ways.ms(drone, dock.place, home) if self._returns else 0
+        there_ms = self._open_ways.ms(drone, course.base_end, (dock.place,)) + back_ms
+        home_ms = self._open_ways.ms(drone, course.base_end, home)
+        if home_ms < there_ms and base_ms + there_ms > left_ms and not self._is_early(drone, now_ms):
+            self._next_try_ms[drone] = now_ms + _RETRY_MS
+            self._tell(f"{drone} turns back on its way to dock {dock.name}: its battery would not last")
+            self._go_home(drone, now_ms)
+
     def _tell(self, line: str) -> None:
         self.told.append(line)
         self.told_count += 1
@@ -192,9 +212,10 @@ class DockQueue:
                 self._since_ms.pop(drone, None)
                 continue
             self._since_ms.setdefault(drone, now_ms)
-            at = course.base[-1].vertex if course.base else course.place
             ways = {
-                dock.name: self._way_ms(at, dock) for dock in self._docks.values() if dock.place not in shut
+                dock.name: self._way_ms(course.base_end, dock)
+                for dock in self._docks.values()
+                if dock.place not in shut
             }
             near = {
                 name: way_ms

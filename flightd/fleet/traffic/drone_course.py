@@ -44,6 +44,11 @@ class DroneCourse:
         return self.ahead[self.released - self.done :]
 
     @property
+    def base_end(self) -> int:
+        """The vertex at which its base ends."""
+        return self.base[-1].vertex if self.base else self.place
+
+    @property
     def is_pushed_aside(self) -> bool:
         """What is not released ends where it may not stay for good."""
         return bool(self.tail) and self.ahead[-1].vertex not in self.ends

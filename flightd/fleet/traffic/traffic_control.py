@@ -33,6 +33,8 @@ ComesHome: TypeAlias = Callable[[str, int, int], bool]
 """Whether a drone comes home with its reserve from a vertex that it reaches after so many milliseconds."""
 HORIZON_MS: Final = 12_000
 """Actions are released until those that are not done last so long: what a drone flies without a link."""
+UNKNOWN_M: Final = 3.0
+"""By how much a drone may be off that does not know by how much: a node beside its own."""
 LATE_MS: Final = 90_000
 """Who does not get on is expected to be so late."""
 
@@ -307,7 +309,7 @@ class TrafficControl:
         places: set[int] = set()
         for drone in holding:
             course = self.drones[drone]
-            places.update(self.conflicts[_end_of(course)])
+            places.update(self.conflicts[course.base_end])
         return {
             drone
             for drone, actions in projected.items()
@@ -363,7 +365,7 @@ class TrafficControl:
             elif at.isdisjoint(closed):
                 shut = closed
             else:
-                shut = self.closed.shut_round_way_out(at, _end_of(course), course.ends)
+                shut = self.closed.shut_round_way_out(at, course.base_end, course.ends)
             if len(others) < len(zones) or shut != closed:
                 inside[drone] = shut.union(*others)
         return avoided | closed, inside
@@ -411,6 +413,11 @@ class TrafficControl:
         }
         return self._replan(met, projected, now_ms)
 
+    @property
+    def zones(self) -> tuple[frozenset[int], ...]:
+        """All where nobody is planned who is not in it, each by itself."""
+        return (*self._avoided.values(), *self.closed.zones)
+
     def avoided(self, drone: str) -> frozenset[int]:
         """Where nobody is planned on account of this drone."""
         return self._avoided.get(drone, frozenset())
@@ -441,15 +448,14 @@ class TrafficControl:
     def is_cut_off(self, drone: str) -> bool:
         """Whether no way leads to its pad but through what is closed, what it is in and leaves left out."""
         course = self.drones[drone]
-        here = _end_of(course)
-        return not any(self.closed.comes_home(course.air, here, end) for end in course.ends)
+        return not any(self.closed.comes_home(course.air, course.base_end, end) for end in course.ends)
 
     def doubt(self, drone: str, doubt_m: float, now_ms: int) -> None:
         """A drone may be so far beside where it should be, beyond what its cell allows for; 0: it is sure."""
-        course = self.drones[drone]
+        course, doubt_m = self.drones[drone], doubt_m if math.isfinite(doubt_m) else UNKNOWN_M
         if doubt_m > 0.0 and course.doubt_m <= 0.0:
             course.doubt_since_ms = now_ms
-        course.doubt_m = doubt_m if math.isfinite(doubt_m) else 0.0
+        course.doubt_m = doubt_m
         if doubt_m <= 0.0:
             self._avoided.pop(drone, None)
             course.late_ms = 0
@@ -489,8 +495,3 @@ class TrafficControl:
 
 def _ends_of(course: DroneCourse) -> tuple[int, ...]:
     return (course.ahead[-1].vertex,) if course.ahead else ()
-
-
-def _end_of(course: DroneCourse) -> int:
-    """The vertex at which its base ends."""
-    return course.base[-1].vertex if course.base else course.place

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -9,7 +10,7 @@ from typing import Final
 
 _VALUE_SPAN_MS: Final = 3_600_000
 """A class of value outweighs the way to it up to so long."""
-MOST_OF_TOUR: Final = 40
+_MOST_OF_TOUR: Final = 40
 """A drone is not given more nodes at a time."""
 
 
@@ -155,18 +156,31 @@ class WorkQueue:
             self._open.pop(node)
             self._given[node] = drone
 
+    def takes_ms(self, times: TourTimes) -> int:
+        """How long all that waits takes at least, the way out to each aisle with it."""
+        aisles: dict[str, list[NodeWork]] = {}
+        for node in self._open:
+            aisles.setdefault(self._work[node].aisle, []).append(self._work[node])
+        total_ms = 0
+        for works in aisles.values():
+            works.sort(key=lambda work: work.index)
+            total_ms += min(times.out_ms(works[0].node), times.out_ms(works[-1].node))
+            total_ms += sum(times.between_ms(a.node, b.node) for a, b in itertools.pairwise(works))
+            total_ms += sum(work.dwell_ms for work in works)
+        return total_ms
+
     def tour(
         self,
         times: TourTimes,
         budget_ms: int,
         busy_aisles: Collection[str] = (),
-        most: int = MOST_OF_TOUR,
+        share_ms: int | None = None,
         drone: str = "",
         without: Collection[str] = (),
     ) -> tuple[str, ...]:
         """The nodes of one tour of a drone within a budget, `without` some: first the most valuable aisle
         that nobody flies in, or that has work for this drone alone, from its nearer end on, then what lies
-        nearest.  Empty where nothing fits."""
+        nearest.  It ends with the node with which it takes `share_ms`.  Empty where nothing fits."""
         aisles: dict[str, list[NodeWork]] = {}
         for node in self._open:
             if node in without:
@@ -189,7 +203,8 @@ class WorkQueue:
                 if fits:
                     left_ms -= way_ms + work.dwell_ms
                     nodes.append(work.node)
-                if nodes and (not fits or len(nodes) >= most):
+                is_share = share_ms is not None and budget_ms - left_ms >= share_ms
+                if nodes and (not fits or is_share or len(nodes) >= _MOST_OF_TOUR):
                     return tuple(nodes)
         return tuple(nodes)
 

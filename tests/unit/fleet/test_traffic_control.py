@@ -3,6 +3,8 @@ it."""
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from flightd.fleet.traffic.lanes import LaneGraph
@@ -190,6 +192,17 @@ def test_others_stop_before_the_grown_cell_of_a_drone_in_doubt_and_are_planned_r
     floor.run()
     assert floor.at("d0") == "pad P1"
     assert "A6" in floor.counted
+
+
+@pytest.mark.parametrize("doubt_m", [math.inf, math.nan])
+def test_a_doubt_without_a_number_is_no_certainty(doubt_m: float) -> None:
+    floor = Floor()
+    floor.control.doubt("d0", doubt_m, 0)
+    zone = floor.control.closed_by()["d0"]
+    floor.control.doubt("d0", 3.0, 0)
+    assert zone == floor.control.closed_by()["d0"]
+    floor.control.doubt("d0", 0.0, 0)
+    assert floor.control.closed_by() == {}
 
 
 def test_who_was_released_into_a_cell_that_grows_is_paused() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from flightd.fleet.traffic.work_queue import NodeWork, TourTimes, Value, WorkQueue
@@ -36,6 +38,15 @@ def test_a_tour_fits_its_budget_with_the_way_home() -> None:
     nodes = queue.tour(times(), 60_000)
     assert nodes == ("A1", "A2", "A3", "A4")  # 4 x 12 s, and 8 s home
     assert queue.tour(times(), 5_000) == ()
+
+
+def test_a_share_of_the_work_is_one_of_its_time() -> None:
+    near = [replace(work(f"A{i}"), dwell_ms=2_000) for i in range(1, 7)]
+    far = [replace(work(f"D{i}"), dwell_ms=30_000) for i in range(1, 4)]
+    queue = WorkQueue([*near, *far])
+    assert queue.takes_ms(times()) == (2_000 + 5 * HOP_MS + 6 * 2_000) + (32_000 + 2 * HOP_MS + 3 * 30_000)
+    nodes = queue.tour(times(), 1_000_000, share_ms=queue.takes_ms(times()) // 2)
+    assert nodes == ("A1", "A2", "A3", "A4", "A5", "A6", "D3")
 
 
 def test_what_lies_too_far_for_the_battery_keeps_nobody_from_the_rest() -> None:

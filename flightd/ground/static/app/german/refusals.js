@@ -716,6 +716,7 @@ export default {
   "what is to be closed": "was gesperrt werden soll",
   "what is to be opened": "was geöffnet werden soll",
   "there is no way there": "es führt kein Weg dorthin",
+  "no battery reaches it": "kein Akku reicht bis dorthin",
   "{name} failed there": "{name} ist dort ausgefallen",
   "{name} is silent there": "{name} ist dort stumm",
   "a calendar has 1 to {n} days": "ein Kalender hat 1 bis {n} Tage",
