@@ -73,6 +73,8 @@ class PaperDrone:
         self._tell = tell
         self.on_person: Callable[[], None] = lambda: None
         self.heard = self.sees = True
+        self.sigmas_m: tuple[float | None, float | None] = (0.02, 0.02)
+        """Along x and y; None is told where one is infinite."""
         self.counts = self.never_starts = False
         self.obstacles: tuple[str, ...] = ()
         """What keeps it on the ground."""
@@ -99,6 +101,7 @@ class PaperDrone:
         """Its daemon begins anew, believing to be on its pad."""
         self._session += 1
         self.phase, self.way, self.paused, self.left_s = Phase.PREFLIGHT, [], False, 900.0
+        self.plan, self._plan_waits = "", False
         self.waits = False
         self.stand = self.site.home.node
         """The node on whose pad it believes to stand before a flight."""
@@ -286,7 +289,7 @@ class PaperDrone:
         """What it tells now."""
         armed = self.flies
         x_m, y_m = self._pad if self._begins_in_air else (self.truth.x_m, self.truth.y_m)
-        at = Position(x_m, y_m, 0.0, 0.0, 1.0, 0.02, 0.02) if armed and self.sees else None
+        at = Position(x_m, y_m, 0.0, 0.0, 1.0, *self.sigmas_m) if armed and self.sees else None
         landed = "in_air" if armed else "on_ground"
         vehicle = VehicleReport(
             "GUIDED", armed, True, landed, 0.0, 0.0, self.battery_frac, 12.0, 0.0, 0.0, ""

@@ -52,6 +52,8 @@ class PaperFleet:
         self._running: asyncio.Future[None] | None = None
         self.deciding: asyncio.Event | None = None
         """What is decided comes no sooner."""
+        self.decides_s: Callable[[], float] = lambda: 0.0
+        """How long it takes."""
         self.pages: dict[tuple[str, str], Any] = {}
         self.drones = {name: PaperDrone(name, site, self._hear) for name, site in sites.items()}
         self.judge = FleetJudge(CellSize(upright_m=100.0), 0.0)
@@ -84,6 +86,7 @@ class PaperFleet:
     async def aside(self, work: Callable[[], T]) -> T:
         """At once, and what comes of it when a test wants it."""
         found = work()
+        await asyncio.sleep(self.decides_s())
         if self.deciding is not None:
             await self.deciding.wait()
         return found

@@ -16,6 +16,7 @@ from flightd.core.types import CommandKind, Phase
 from flightd.fleet.traffic.dispatcher import DroneReport
 from flightd.fleet.traffic.motions import Act
 from flightd.fleet.traffic.plan import Action
+from flightd.fleet.traffic.traffic_control import UNKNOWN_M
 from flightd.fleet.vda5050.order import Order
 from flightd.fleet.vehicle.signals import Decided
 from flightd.ground.fleet.base_orders import BaseOrders, instant, scan
@@ -33,8 +34,6 @@ FLIGHT_S: Final = 3600.0
 """The charge that traffic is told is the time that the drone itself expects to have left, in such flights."""
 _FULL_S: Final = 600.0
 """Of a drone that tells no charge: its own rules bring it home."""
-_DOUBTS_M: Final = 3.0
-"""By how much a drone may be off that looks for its place, or tells none: a node beside its own."""
 _IS_OVER: Final = "its flight is over: it flies the next one once its flightd was started anew"
 _SIGMAS: Final = 3.0
 _CALLED_OFF_EVERY_S: Final = 2.0
@@ -210,9 +209,10 @@ class FleetDrone:
             return 0.0
         at = status.position
         if at is None or status.phase in {Phase.RELOCATE, Phase.RECOVER}:
-            return _DOUBTS_M
-        worst_m = _SIGMAS * max((s for s in (at.sigma_x_m, at.sigma_y_m) if s is not None), default=0.0)
-        return max(worst_m - self._uncertainty_m, 0.0)
+            return UNKNOWN_M
+        told = [sigma_m for sigma_m in (at.sigma_x_m, at.sigma_y_m) if sigma_m is not None]
+        worst_m = _SIGMAS * max(told, default=0.0) - self._uncertainty_m
+        return max(worst_m, 0.0 if len(told) == 2 else UNKNOWN_M)
 
     def _see_done(self) -> None:
         while self._base and self._is_done(self._base[0]):
@@ -338,7 +338,8 @@ class FleetDrone:
         self._base.clear()
         self._orders = None
         self.drone.flies = self.drone.lands = self.drone.docks = self.drone.has_more = False
-        if self.drone.is_automatic and now_s - self._called_off_s >= _CALLED_OFF_EVERY_S:
+        takes_it = self.drone.is_heard and self.drone.is_automatic
+        if takes_it and now_s - self._called_off_s >= _CALLED_OFF_EVERY_S:
             self._called_off_s = now_s
             self._refused = ""
             if not self.drone.vehicle.is_idle:

@@ -271,6 +271,8 @@ class StationTraffic:
             self._flown.add(name)
         if name in self._flown and (seen.report is None or drone.is_ours):
             drone.fly(decided.base.get(name, ()), now_s, paused=name in decided.paused)
+        elif decided.base.get(name):  # not told of it, it would never do what traffic waits for
+            self._flown.discard(name)
 
     def _tell_of_docks(self) -> None:
         docks = self._dispatcher.docks

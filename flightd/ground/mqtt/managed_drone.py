@@ -234,6 +234,7 @@ class ManagedDrone:
         self._ways = WaysHome(welcome["floor"])
         self._status = self._standing = self._stood = self._event_seq = None
         self._is_new, self.is_automatic, self._waited = True, False, False
+        self.flies = self.lands = self.docks = self.has_more = False
         self._asked_at_s = -_ASK_AGAIN_S
         self._return, self._charge = SafeReturn(), ChargeTrend()
         self._counts.given = ()
