@@ -6,6 +6,8 @@ import asyncio
 import contextlib
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import aiomqtt
 import pytest
@@ -13,8 +15,10 @@ import pytest
 from flightd.core.errors import InputError
 from flightd.fleet.vda5050.codec import Version, encoded
 from flightd.fleet.vehicle.drone_factsheet import Measures
+from flightd.ground.hub import Hub
 from flightd.ground.mqtt.broker_address import BrokerAddress, read_body, read_broker, read_version
 from flightd.ground.mqtt.fleet_link import FleetLink
+from flightd.ground.mqtt.managed_drone import ManagedDrone
 from tests.rigs.broker import Mosquitto, mosquitto
 from tests.rigs.event_loops import real
 from tests.rigs.ground_link import address_of, local, serving, telling
@@ -100,6 +104,22 @@ def test_a_broker_that_dies_stops_nothing_and_is_found_again(
     assert f"demo: {broker.url}: " in caplog.text
 
 
+def test_an_error_about_a_drone_or_its_connection_ends_no_station(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def go() -> None:
+        nowhere = BrokerAddress("broker..hall", 1883, tls=False)
+        hub = cast(Hub, SimpleNamespace(drones={"demo": None}))
+        running = asyncio.ensure_future(FleetLink(["demo"], nowhere, Version.V2_1, BODY).run(hub))
+        await until(lambda: caplog.text.count("failed, and begins anew") == 2)
+        assert not running.done()
+        running.cancel()
+        await asyncio.wait([running])
+
+    monkeypatch.setattr(ManagedDrone, "run", lambda *_: 1 / 0)
+    real(and_a_turn(go()))
+
+
 def test_of_a_station_that_is_killed_the_broker_says_so(tmp_path: Path) -> None:
     async def go(broker: Mosquitto) -> None:
         manager = Manager(Version.V2_1)
@@ -155,7 +175,8 @@ def test_a_broker_is_named_by_its_url_and_no_refusal_tells_a_password() -> None:
     assert told == BrokerAddress("::1", 99, True, "ann", "s:cret", "top")
     assert told.shown == "mqtts://[::1]:99"
     for wrong in ("hall", "http://hall", "mqtt://", "mqtt://a:secret@hall:x", "mqtt://a:secret@hall/a/b",
-                  "mqtt://hall/#", "mqtt://[::1"):  # fmt: skip
+                  "mqtt://hall/#", "mqtt://[::1", "mqtt://a:secret@broker..hall",
+                  f"mqtt://{'a' * 64}.hall"):  # fmt: skip
         with pytest.raises(InputError) as refused:
             read_broker(wrong)
         assert str(refused.value).startswith("--mqtt: ")

@@ -30,7 +30,7 @@ from flightd.ground.hub import Hub
 from flightd.ground.messages import Act
 from flightd.ground.mqtt.managed_drone import ManagedDrone, OrderRules
 from flightd.ground.mqtt.safe_return import Standing
-from flightd.ground.mqtt.vehicle_sides import VehicleSides
+from flightd.ground.mqtt.vehicle_sides import VehicleSides, kept_on
 from flightd.ground.valued_nodes import ByValue
 from flightd.mission.plan.leg_times import Pace
 from flightd.site.site import SAME_NODE_M
@@ -107,18 +107,8 @@ class OwnFleet(VehicleSides):
         self.follow(hub)
         async with asyncio.TaskGroup() as tasks:
             for name, drone in self._drones.items():
-                tasks.create_task(self._keep(name, drone, hub), name=f"{name} as a vehicle")
+                tasks.create_task(kept_on(name, drone, hub), name=f"{name} as a vehicle")
             tasks.create_task(self._control(), name="traffic")
-
-    async def _keep(self, name: str, drone: ManagedDrone, hub: Hub) -> None:
-        """An error about one drone ends neither the others' flights nor the station."""
-        while True:
-            try:
-                await drone.run(hub.drones[name])
-            except Exception:  # noqa: BLE001 - it is flown round, as one that nobody commands
-                _LOG.error("%s: what stepped it failed, and begins anew", name, exc_info=True)
-                drone.is_automatic = False
-            await asyncio.sleep(_AGAIN_S)
 
     async def leave(self) -> None:
         """Have everybody who flies, and whom no person has, hold where he is.  Call it when `run` has ended,

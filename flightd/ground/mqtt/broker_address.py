@@ -45,7 +45,8 @@ def read_broker(text: str) -> BrokerAddress:
     except ValueError:
         raise InputError("is no URL of a broker", key=OPTION, remedy=_example()) from None
     interface = url.path.strip("/")
-    if url.scheme not in _PORTS or not url.hostname or set(text) & {"?", "#"} or not _is_level(interface):
+    is_url = url.scheme in _PORTS and bool(url.hostname) and not set(text) & {"?", "#"}
+    if not is_url or not url.hostname or not _is_host(url.hostname) or not _is_level(interface):
         raise InputError(f"{_shown(url)!r} is no URL of a broker", key=OPTION, remedy=_example())
     return BrokerAddress(
         host=url.hostname,
@@ -75,6 +76,15 @@ def read_body(text: str) -> Measures:
             f"{text!r} is no size of a drone", key=f"{OPTION}-body", remedy="give metres, as 0.6x0.6x0.3"
         )
     return Measures(_MAX_SPEED_MPS, 1.0, 1.0, *sizes)
+
+
+def _is_host(name: str) -> bool:
+    """One that a resolver takes: it fails over empty and overlong labels."""
+    try:
+        name.encode("idna")
+    except UnicodeError:
+        return False
+    return True
 
 
 def _is_level(text: str) -> bool:

@@ -26,7 +26,7 @@ from flightd.ground.access.roles import Identity, Role
 from flightd.ground.hub import Hub
 from flightd.ground.mqtt.broker_address import BrokerAddress
 from flightd.ground.mqtt.managed_drone import MANUFACTURER, ManagedDrone, OrderRules
-from flightd.ground.mqtt.vehicle_sides import VehicleSides
+from flightd.ground.mqtt.vehicle_sides import VehicleSides, kept_on
 from flightd.runtime.within import Within
 
 MANAGER: Final = Identity("fleet manager", Role.OPERATOR, "mqtt")
@@ -58,13 +58,16 @@ class DroneAtBroker:
         """In a row; the first is logged."""
 
     async def run(self) -> None:
-        """Connect, and again after whatever went wrong."""
+        """Connect, and again after whatever went wrong: that ends neither the station nor what it flies."""
         while True:
             try:
                 await self._connected()
             except* aiomqtt.MqttError as group:
                 if not self._failures:
                     _LOG.warning("%s: %s: %s", self._name, self._broker.shown, group.exceptions[0])
+            except* Exception:  # noqa: BLE001 - an error of ours
+                if not self._failures:
+                    _LOG.error("%s at the broker: it failed, and begins anew", self._name, exc_info=True)
             await asyncio.sleep(_AGAIN_S[min(self._failures, len(_AGAIN_S) - 1)])
             self._failures += 1
 
@@ -190,7 +193,7 @@ class FleetLink(VehicleSides):
         self.follow(hub)
         async with asyncio.TaskGroup() as tasks:
             for name, drone in self._drones.items():
-                tasks.create_task(drone.run(hub.drones[name]), name=f"{name} as a vehicle")
+                tasks.create_task(kept_on(name, drone, hub), name=f"{name} as a vehicle")
             for one in self._at_broker:
                 tasks.create_task(one.run(), name="at the broker")
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 from flightd.ground.hub import Hub
 from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.mqtt.managed_drone import ManagedDrone
+
+_LOG = logging.getLogger(__name__)
+_AGAIN_S: Final = 5.0
 
 
 class VehicleSides:
@@ -51,6 +56,17 @@ class VehicleSides:
     def has_use_for(self, key: PictureKey) -> bool:  # noqa: ARG002 - as the protocol has it
         """No pictures are wanted here."""
         return False
+
+
+async def kept_on(name: str, drone: ManagedDrone, hub: Hub) -> None:
+    """Step a drone until cancelled: an error about one ends neither the others' flights nor the station."""
+    while True:
+        try:
+            await drone.run(hub.drones[name])
+        except Exception:  # noqa: BLE001 - it is as one that nobody commands
+            _LOG.error("%s: what stepped it failed, and begins anew", name, exc_info=True)
+            drone.is_automatic = False
+        await asyncio.sleep(_AGAIN_S)
 
 
 def _tell_page(hub: Hub, name: str, taken: bool) -> None:
