@@ -86,7 +86,8 @@ class PaperFleet:
     async def aside(self, work: Callable[[], T]) -> T:
         """At once, and what comes of it when a test wants it."""
         found = work()
-        await asyncio.sleep(self.decides_s())
+        if (takes_s := self.decides_s()) > 0.0:
+            await asyncio.sleep(takes_s)
         if self.deciding is not None:
             await self.deciding.wait()
         return found

@@ -180,7 +180,7 @@ class WorkQueue:
     ) -> tuple[str, ...]:
         """The nodes of one tour of a drone within a budget, `without` some: first the most valuable aisle
         that nobody flies in, or that has work for this drone alone, from its nearer end on, then what lies
-        nearest.  It ends with the node with which it takes `share_ms`.  Empty where nothing fits."""
+        nearest.  It takes as nearly `share_ms` as that gives, a node at least.  Empty where nothing fits."""
         aisles: dict[str, list[NodeWork]] = {}
         for node in self._open:
             if node in without:
@@ -200,11 +200,12 @@ class WorkQueue:
             for work in self._swept(works, nodes, times):
                 way_ms = times.between_ms(nodes[-1], work.node) if nodes else times.out_ms(work.node)
                 fits = way_ms + work.dwell_ms + times.home_ms(work.node) <= left_ms
-                if fits:
+                with_ms = budget_ms - left_ms + way_ms + work.dwell_ms
+                is_nearer = share_ms is None or abs(with_ms - share_ms) <= abs(budget_ms - left_ms - share_ms)
+                if fits and (is_nearer or not nodes):
                     left_ms -= way_ms + work.dwell_ms
                     nodes.append(work.node)
-                is_share = share_ms is not None and budget_ms - left_ms >= share_ms
-                if nodes and (not fits or is_share or len(nodes) >= _MOST_OF_TOUR):
+                if nodes and (not fits or not is_nearer or len(nodes) >= _MOST_OF_TOUR):
                     return tuple(nodes)
         return tuple(nodes)
 

@@ -47,6 +47,8 @@ def test_a_share_of_the_work_is_one_of_its_time() -> None:
     assert queue.takes_ms(times()) == (2_000 + 5 * HOP_MS + 6 * 2_000) + (32_000 + 2 * HOP_MS + 3 * 30_000)
     nodes = queue.tour(times(), 1_000_000, share_ms=queue.takes_ms(times()) // 2)
     assert nodes == ("A1", "A2", "A3", "A4", "A5", "A6", "D3")
+    two = WorkQueue([work("A1"), work("D1")])
+    assert two.tour(times(), 1_000_000, share_ms=two.takes_ms(times()) // 2) == ("A1",)
 
 
 def test_what_lies_too_far_for_the_battery_keeps_nobody_from_the_rest() -> None:
