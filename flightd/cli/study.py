@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
-import json
 import os
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from flightd.cli.options import AsJson
-from flightd.core.errors import InputError, RunError, cannot_write
+from flightd.core.errors import FlightdError, InputError, RunError
 
 if TYPE_CHECKING:
     from flightd.app.log_study.finding import LogFindings, Study
+    from flightd.app.log_study.sources import LogSource
 
 EXAMPLES = """Examples:
   flightd study flights/ --with replay              would today's code decide the same?
@@ -51,7 +53,8 @@ def study(
         str, typer.Option(metavar="URL", help="The Ray cluster; RAY_ADDRESS, or one started for this.")
     ] = "",
     out: Annotated[
-        Path | None, typer.Option(metavar="F", help="Write the findings there, a line of JSON for each log.")
+        Path | None,
+        typer.Option(metavar="F", help="Write the findings there as they come, a line of JSON a log."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -67,51 +70,66 @@ def study(
 
     Exit 0 if nothing differs, else 1.  A log that cannot be studied is told, and costs the others nothing.
     """
-    from flightd.app.log_study.engines import run_local, run_ray
+    from flightd.app.log_study.findings_file import FindingsFile
+    from flightd.app.log_study.findings_file import as_json as line_of_json
     from flightd.app.log_study.sources import log_sources
     from flightd.app.log_study.studies import chosen_studies
-    from flightd.studies.progress_bar import track
 
     if address and engine is Engine.LOCAL:
         raise InputError("is for --engine ray alone", key="--address")
     chosen, sources = chosen_studies(studies), log_sources(paths)
-    width = min(workers or os.cpu_count() or 1, len(sources))
-    running = (
-        run_local(sources, chosen, width)
-        if engine is Engine.LOCAL
-        else run_ray(sources, chosen, width, address=address)
-    )
-    found: dict[int, LogFindings] = dict(track(running, "studying", len(sources)))
-    ordered = [found[number] for number in range(len(sources))]
-    if out is not None:
-        _write(out, ordered)
+    file = None if out is None else FindingsFile(out)
+    found: dict[int, LogFindings] = {}
+    ended: BaseException | None = None
+    try:
+        for number, one in _studied(sources, chosen, engine, workers, address):
+            found[number] = one
+            if file is not None:
+                file.append(number, one)
+    except (FlightdError, KeyboardInterrupt) as err:
+        ended = err  # what was found until then was hours of work
+    ordered = [found[number] for number in sorted(found)]
+    if file is not None:
+        file.end(ordered)
     failed = sum(not log.passed for log in ordered)
-    if as_json:
-        print(json.dumps(_document(ordered, chosen), ensure_ascii=False))
-    else:
+    if ordered and as_json:
+        print(line_of_json(_document(ordered, chosen, of=len(sources))))
+    elif ordered:
         _print(ordered, chosen)
+    if ended is not None:
+        raise ended
+    if file is not None and file.trouble is not None:
+        raise file.trouble
     if failed:
         raise RunError(f"{failed} of {len(ordered)} logs differ or could not be studied")
 
 
-def _document(found: list[LogFindings], studies: tuple[Study, ...]) -> dict[str, Any]:
+def _studied(
+    sources: list[LogSource], chosen: tuple[Study, ...], engine: Engine, workers: int | None, address: str
+) -> Iterator[tuple[int, LogFindings]]:
+    from flightd.app.log_study.engines import run_local
+    from flightd.app.log_study.ray_engine import run_ray
+    from flightd.studies.progress_bar import track
+
+    width = min(workers or os.cpu_count() or 1, len(sources))
+    with contextlib.closing(
+        run_local(sources, chosen, width)
+        if engine is Engine.LOCAL
+        else run_ray(sources, chosen, width, address=address)
+    ) as running:
+        yield from track(running, "studying", len(sources))
+
+
+def _document(found: list[LogFindings], studies: tuple[Study, ...], of: int) -> dict[str, Any]:
     outcomes = {
         study.value: dict(sorted(Counter(log.findings[study].outcome.value for log in found).items()))
         for study in studies
     }
     return {
-        "passed": all(log.passed for log in found),
+        "passed": len(found) == of and all(log.passed for log in found),
         "outcomes": outcomes,
         "logs": [log.document() for log in found],
     }
-
-
-def _write(path: Path, found: list[LogFindings]) -> None:
-    lines = [json.dumps(log.document(), ensure_ascii=False) + "\n" for log in found]
-    try:
-        path.write_text("".join(lines), encoding="utf-8")
-    except OSError as err:
-        raise cannot_write(path, err) from None
 
 
 def _print(found: list[LogFindings], studies: tuple[Study, ...]) -> None:

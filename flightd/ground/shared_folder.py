@@ -9,20 +9,17 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
-from typing import Any, TypeAlias
+from typing import TypeAlias
 from urllib.parse import urlsplit
 
 from flightd.core.errors import InputError, UnavailableError
-from flightd.core.extras import missing_extra
 from flightd.runtime.durable_files import sync_folder
 from flightd.runtime.remote_errors import remote_errors
+from flightd.runtime.remote_files import BUCKETS, close_files, file_system
 
-PASSWORD = "FLIGHTD_SFTP_PASSWORD"  # noqa: S105 - the name of a variable
 Stamp: TypeAlias = tuple[int, str]
 """Size and time of a file: another whenever it is written."""
-_BUCKETS = frozenset({"s3", "s3a"})
 _WRITTEN_STILL = (".tmp", ".part", ".partial", ".filepart", ".crdownload", "~")
 
 
@@ -45,7 +42,7 @@ class SharedFolder:
         self.address = address
         with self._refusals("cannot be opened"):
             self._files, self._path = file_system(address, file, key, what)
-            self._is_bucket = urlsplit(address).scheme in _BUCKETS
+            self._is_bucket = urlsplit(address).scheme in BUCKETS
             if self._is_bucket:
                 # Its folders are but names.  A bucket has an owner, rights and a price: none is made here.
                 self._files.call_s3("head_bucket", Bucket=self._path.partition("/")[0])
@@ -58,9 +55,7 @@ class SharedFolder:
 
     def close(self) -> None:
         """Of a connection."""
-        client = getattr(self._files, "client", None)
-        if client is not None:
-            client.close()
+        close_files(self._files)
 
     def listed(self, below: str = "") -> dict[str, Stamp]:
         """Whole files by name; none where there is no folder `below`, which is one of ours."""
@@ -142,38 +137,3 @@ class SharedFolder:
                 key=self._key,
                 remedy="may flightd read and write there?",
             ) from None
-
-
-def file_system(address: str, file: Path | str, key: str, what: str) -> tuple[Any, str]:
-    """The file system of a folder or URL, and the path on it, for the command or option `what`."""
-    try:
-        import fsspec
-    except ModuleNotFoundError:
-        raise missing_extra("exchange", what) from None
-    scheme = urlsplit(address).scheme
-    if scheme in {"sftp", "ssh"}:
-        return _sftp(address, file, key)
-    if scheme in _BUCKETS and find_spec("s3fs") is None:
-        raise missing_extra("s3", "s3://…")
-    files, path = fsspec.core.url_to_fs(address, skip_instance_cache=True)
-    return files, str(path)
-
-
-def _sftp(address: str, file: Path | str, key: str) -> tuple[Any, str]:
-    parts = urlsplit(address)
-    if parts.password:
-        raise InputError(
-            "a password does not belong into an address",
-            file=file,
-            key=key,
-            remedy=f"give it in {PASSWORD}, or use a key",
-        )
-    if not parts.hostname or not parts.path:
-        raise InputError("not the URL of a folder", file=file, key=key, remedy="give sftp://USER@HOST/FOLDER")
-    try:
-        from flightd.ground.known_host_sftp import KnownHostSftp
-    except ModuleNotFoundError:
-        raise missing_extra("exchange", "sftp://…") from None
-    given = {"port": parts.port, "username": parts.username, "password": os.environ.get(PASSWORD)}
-    asked = {name: value for name, value in given.items() if value}
-    return KnownHostSftp(parts.hostname, skip_instance_cache=True, **asked), parts.path

@@ -18,6 +18,7 @@ from flightd.ground.ground_store.batch import Batch, SentLook
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.wms_exchange.exchange import Exchange, Exchanged
 from flightd.ground.wms_exchange.exchange_file import load_exchange
+from flightd.runtime import remote_files
 
 _BEGIN = 1_760_000_000_000_000_000
 _RUN_NS = 100
@@ -114,7 +115,7 @@ class CutFiles:
 
 def cut_exchanges(monkeypatch: pytest.MonkeyPatch) -> Cuts:
     """Of every file system and every transaction of an exchange from now on."""
-    cuts, opened = Cuts(), shared_folder.file_system
+    cuts, opened = Cuts(), remote_files.file_system
 
     def cut_files(address: str, file: Path | str, key: str, what: str) -> tuple[Any, str]:
         files, path = opened(address, file, key, what)

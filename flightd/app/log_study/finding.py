@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import enum
+import traceback
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
+
+from flightd.core.errors import FlightdError
+
+_FLIGHTD: Final = Path(__file__).parents[2]
 
 
 class Study(enum.StrEnum):
@@ -59,6 +66,22 @@ class LogFindings:
             for study, found in self.findings.items()
         }
         return {"log": self.log, "passed": self.passed, "studies": told}
+
+
+def all_failed(log: str, studies: Iterable[Study], text: str) -> LogFindings:
+    """Of a log that none of the studies came to."""
+    return LogFindings(log, {study: Finding(Outcome.FAILED, text) for study in studies})
+
+
+def told_in_line(err: BaseException) -> str:
+    """What went wrong with a log, in one line: of what flightd did not foresee, where in it that was, too."""
+    if isinstance(err, FlightdError):
+        return str(err)
+    text = next((line.strip() for line in str(err).splitlines() if line.strip()), "")
+    told = f"{type(err).__name__}: {text}" if text else type(err).__name__
+    frames = traceback.extract_tb(err.__traceback__)
+    at = next((frame for frame in reversed(frames) if Path(frame.filename).is_relative_to(_FLIGHTD)), None)
+    return told if at is None else f"{told} ({Path(at.filename).name}, line {at.lineno})"
 
 
 def same_or(text: str, figures: dict[str, Any]) -> Finding:

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any, Final
 
+from flightd.app.log_study.finding import Study
 from flightd.core.errors import InputError, UnavailableError
 from flightd.runtime.remote_errors import remote_errors
+from flightd.runtime.remote_files import close_files, file_system, url_of
 
 _ENDING: Final = ".mcap"
 _TRUTH: Final = "truth"
 """The simulator's own log beside that of a flight is not one."""
-_BESIDE: Final = ("truth.mcap", "summary.json", "inventory.db", "inventory.db-wal", "inventory.db-shm")
+_INVENTORY: Final = ("inventory.db", "inventory.db-wal", "inventory.db-shm")
+_BESIDE: Final[Mapping[Study, Sequence[str]]] = MappingProxyType(
+    {Study.CODES: _INVENTORY, Study.JUDGE: ("truth.mcap", "summary.json", *_INVENTORY)}
+)
+"""What lies beside a log and is read; the others read the log alone."""
 _PICTURES: Final = "evidence"
-"""The inventory's, in folders of their own."""
+"""The inventory's, in folders of their own, for `Study.CODES`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,19 +34,21 @@ class LogSource:
     name: str
     place: str
 
+    @property
+    def is_local(self) -> bool:
+        """A path of this machine's."""
+        return "://" not in self.place
+
     @contextlib.contextmanager
-    def fetched(self) -> Iterator[Path]:
-        """The log as a file with what of its flight lies beside it; gone afterwards if it had to be fetched:
-        of a folder of many logs, no other is."""
-        if "://" not in self.place:
+    def fetched(self, studies: Collection[Study]) -> Iterator[Path]:
+        """The log as a file with what of its flight lies beside it; gone afterwards if it had to be fetched,
+        which is done with what these `studies` read alone."""
+        if self.is_local:
             yield Path(self.place)
             return
-        files, path = _file_system(self.place)
         with TemporaryDirectory(prefix="flightd-study-") as made:
-            try:
-                _fetch(files, PurePosixPath(path), Path(made))
-            except remote_errors() as err:
-                raise UnavailableError(f"cannot be fetched: {err}", file=self.place) from None
+            with _opened(self.place, "cannot be fetched") as (files, path):
+                _fetch(files, path, Path(made), studies)
             yield Path(made) / PurePosixPath(path).name
 
 
@@ -68,25 +77,26 @@ def _local(path: Path) -> Iterator[LogSource]:
 
 
 def _remote(url: str) -> Iterator[LogSource]:
-    files, path = _file_system(url)
-    scheme = url.partition("://")[0]
-    try:
-        names = [path] if path.endswith(_ENDING) else sorted(files.find(path))
-    except remote_errors() as err:
-        raise UnavailableError(f"cannot be listed: {err}", file=url) from None
+    with _opened(url, "cannot be listed") as (files, root):
+        names = [root] if root.endswith(_ENDING) else sorted(files.find(root))
     for name in names:
         if _is_flight(PurePosixPath(name).name):
-            place = f"{scheme}://{name.removeprefix(f'{scheme}://')}"
+            place = url_of(url, root, name)
             yield LogSource(place, place)
 
 
-def _fetch(files: Any, log: PurePosixPath, into: Path) -> None:
-    there = {PurePosixPath(name).name for name in files.ls(str(log.parent), detail=False)}
-    for name in (log.name, *(name for name in _BESIDE if name in there)):
-        files.get_file(str(log.parent / name), str(into / name))
-    if _PICTURES in there:
-        for name in files.find(str(log.parent / _PICTURES)):  # one by one: a folder's name may have brackets
-            picture = into / PurePosixPath(name).relative_to(log.parent)
+def _fetch(files: Any, log: str, into: Path, studies: Collection[Study]) -> None:
+    folder, _, name = log.rpartition("/")
+    files.get_file(log, str(into / name))
+    wanted = dict.fromkeys(name for study in studies for name in _BESIDE.get(study, ()))
+    if not wanted:
+        return
+    there = {PurePosixPath(name).name for name in files.ls(folder, detail=False)}
+    for name in (name for name in wanted if name in there):
+        files.get_file(f"{folder}/{name}", str(into / name))
+    if Study.CODES in studies and _PICTURES in there:
+        for name in files.find(f"{folder}/{_PICTURES}"):  # one by one: a folder's name may have brackets
+            picture = into / name.removeprefix(f"{folder}/")
             picture.parent.mkdir(parents=True, exist_ok=True)
             files.get_file(name, str(picture))
 
@@ -95,16 +105,16 @@ def _is_flight(name: str) -> bool:
     return name.endswith(_ENDING) and not name.startswith(_TRUTH)
 
 
-def _file_system(url: str) -> tuple[Any, str]:
-    """The file system of a URL, and the path on it."""
+@contextlib.contextmanager
+def _opened(url: str, what: str) -> Iterator[tuple[Any, str]]:
+    """The file system of a URL, and the path on it; UnavailableError that says so and `what` did not work."""
     try:
-        import fsspec
-    except ImportError:
-        raise UnavailableError(
-            "needs fsspec", file=url, remedy="pip install 'flightd[study]', for S3 'flightd[s3]'"
-        ) from None
-    try:
-        files, path = fsspec.core.url_to_fs(url)
+        files, path = file_system(url, url, "", "flightd study of a URL", extra="study")
     except remote_errors() as err:
         raise UnavailableError(f"cannot be opened: {err}", file=url) from None
-    return files, str(path)
+    try:
+        yield files, path
+    except remote_errors() as err:
+        raise UnavailableError(f"{what}: {err}", file=url) from None
+    finally:
+        close_files(files)

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from flightd.app.log_study.finding import Study
 from flightd.app.log_study.sources import log_sources
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.ground_store.open_store import opened_store
@@ -71,12 +72,17 @@ def test_logs_are_fetched_from_a_bucket_with_what_lies_beside_them(bucket: str, 
         files.pipe_file(f"hall-3/2026/monday/{name}", f"what is in {name}".encode())
     (source,) = log_sources([f"{bucket}/2026"])
     assert source.name == f"{bucket}/2026/monday/flight.mcap"
-    with source.fetched() as log:
+    with source.fetched([Study.CODES, Study.JUDGE]) as log:
         assert log.read_text() == "what is in flight.mcap"
         here = {str(path.relative_to(log.parent)) for path in log.parent.rglob("*") if path.is_file()}
         assert here == {"flight.mcap", "summary.json", "evidence/ab/abcd.jpg"}
+    with source.fetched([Study.REPLAY]) as log:
+        assert [path.name for path in log.parent.iterdir()] == ["flight.mcap"]
     files.rm("hall-3/2026", recursive=True)
-    with pytest.raises(UnavailableError, match=r"monday/flight.mcap: cannot be fetched: "), source.fetched():
+    with (
+        pytest.raises(UnavailableError, match=r"monday/flight.mcap: cannot be fetched: "),
+        source.fetched([Study.REPLAY]),
+    ):
         pass
 
 

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from flightd.app.log_study.finding import Study
+from flightd.app.log_study.sources import log_sources
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.ground_store.open_store import opened_store
-from flightd.ground.shared_folder import PASSWORD, SharedFolder
+from flightd.ground.shared_folder import SharedFolder
+from flightd.runtime.remote_files import PASSWORD
 from tests.rigs.drop_folders import check_files_come_and_go
 from tests.rigs.extras import of_extra
 
@@ -78,3 +81,19 @@ def test_a_place_for_pictures_that_cannot_be_had_is_one_line(tmp_path: Path) -> 
     with pytest.raises(UnavailableError) as refused:
         opened_store(str(tmp_path / "counts.db"), url)
     assert str(refused.value).startswith(f"--evidence: {url}: cannot be opened: Protocol not known: nowhere")
+
+
+def test_logs_to_study_are_fetched_with_the_host_in_their_names(host: str, tmp_path: Path) -> None:
+    (tmp_path / "logs" / "monday").mkdir(parents=True)
+    log = tmp_path / "logs" / "monday" / "flight #1?.mcap"
+    log.write_bytes(b"what was flown")
+    log.with_name("summary.json").write_bytes(b"{}")
+    (source,) = log_sources([f"{host}{tmp_path}/logs"])
+    assert source.name == f"{host}{log}"
+    with source.fetched([Study.JUDGE]) as fetched:
+        assert fetched.read_bytes() == b"what was flown"
+        assert {path.name for path in fetched.parent.iterdir()} == {log.name, "summary.json"}
+    assert log_sources([source.place]) == [source]
+    (tmp_path / ".ssh" / "known_hosts").write_text("")
+    with pytest.raises(UnavailableError, match="not found in known_hosts"):
+        log_sources([f"{host}{tmp_path}/logs"])

@@ -1,4 +1,4 @@
-"""Work on a log whose worker dies on the way, for processes that import it by name."""
+"""Work on a log whose worker dies or fails on the way, for processes that import it by name."""
 
 from __future__ import annotations
 
@@ -22,4 +22,10 @@ def dies_once(source: LogSource, studies: tuple[Study, ...]) -> LogFindings:
 def always_dies(source: LogSource, studies: tuple[Study, ...]) -> LogFindings:
     if Path(source.place).with_name("always dies").exists():
         os._exit(9)
+    return study_source(source, studies)
+
+
+def fails(source: LogSource, studies: tuple[Study, ...]) -> LogFindings:
+    if Path(source.place).with_name("fails").exists():
+        raise ZeroDivisionError("division by zero")
     return study_source(source, studies)

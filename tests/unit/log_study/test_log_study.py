@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import multiprocessing
+import re
 import shutil
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,8 +15,9 @@ from typing import Any
 import pytest
 
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
-from flightd.app.log_study.engines import Work, run_local, run_ray, study_source
+from flightd.app.log_study.engines import Work, run_local, study_source
 from flightd.app.log_study.finding import LogFindings, Outcome, Study
+from flightd.app.log_study.ray_engine import run_ray
 from flightd.app.log_study.sources import LogSource, log_sources
 from flightd.config.schema import load_config
 from flightd.core.topics import Document, RecordedFrame, Topic
@@ -20,7 +25,7 @@ from flightd.replay.log import read_log
 from tests.command import Command
 from tests.replay.synthetic_flight import write_flight
 from tests.rigs.extras import of_extra
-from tests.unit.log_study.dying_work import always_dies, dies_once
+from tests.unit.log_study.dying_work import always_dies, dies_once, fails
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 STUDIES = (Study.DETECT, Study.JUDGE)
@@ -119,6 +124,62 @@ def test_a_worker_that_dies_costs_time_alone(flights: Path, alone: str, tmp_path
     assert rest == [line for number, line in enumerate(right.splitlines()) if number != 1]
 
 
+def test_what_is_unforeseen_is_told_of_its_log_and_ends_no_study(
+    recorded_flight: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(recorded_flight, tmp_path / "old")
+    truth = tmp_path / "old" / "truth.mcap"
+    entries = read_log(truth).entries
+    with McapRecorder(truth, when_full=wait_for_disk) as recorder:
+        for entry in entries:
+            message = entry.message
+            if entry.topic == Topic.TRUTH and isinstance(message, dict):
+                message = {name: value for name, value in message.items() if name != "yaw_rate_radps"}
+            recorder.record(entry.topic, entry.stamp_ns, message)
+    (source,) = log_sources([str(tmp_path / "old" / "flight.mcap")])
+    found = study_source(source, (Study.JUDGE, Study.CODES)).findings
+    assert found[Study.JUDGE].outcome is Outcome.FAILED
+    assert re.fullmatch(r"KeyError: 'yaw_rate_radps' \(judgement\.py, line \d+\)", found[Study.JUDGE].text)
+    assert found[Study.CODES].outcome is not Outcome.FAILED
+
+
+def test_work_that_fails_in_its_worker_costs_its_log_alone(flights: Path, alone: str, tmp_path: Path) -> None:
+    shutil.copytree(flights, tmp_path / "flights")
+    sources = log_sources([str(tmp_path / "flights")])
+    (tmp_path / "flights" / "b" / "fails").touch()
+    found = dict(run_local(sources, STUDIES, 2, fails))
+    texts = {finding.text for finding in found.pop(1).findings.values()}
+    assert len(texts) == 1
+    assert texts.pop().startswith("ZeroDivisionError: division by zero")
+    right = alone.replace(str(flights), str(tmp_path / "flights")).splitlines()
+    assert [json.dumps(found[number].document()) for number in (0, 2, 3)] == [right[0], *right[2:]]
+
+
+def test_a_worker_that_is_killed_while_nobody_waits_for_it_costs_time_alone(
+    flights: Path, alone: str
+) -> None:
+    found: dict[int, LogFindings] = {}
+    others = {*multiprocessing.active_children()}, {*threading.enumerate()}
+    for number, one in run_local(log_sources([str(flights)]), STUDIES, 1):
+        if not found:
+            for worker in {*multiprocessing.active_children()} - others[0]:
+                worker.kill()
+            for keeper in {*threading.enumerate()} - others[1]:
+                if "QueueFeeder" not in keeper.name:  # the pool's own, which ends once it has seen that
+                    keeper.join()
+        found[number] = one
+    assert told(log_sources([str(flights)]), iter(found.items())) == alone
+
+
+def test_who_stops_asking_ends_the_workers(flights: Path) -> None:
+    others = {*multiprocessing.active_children()}
+    running = run_local(log_sources([str(flights)]), STUDIES, 2)
+    next(running)
+    assert {*multiprocessing.active_children()} - others
+    running.close()
+    assert not {*multiprocessing.active_children()} - others
+
+
 def test_ray_finds_the_same_byte_for_byte_though_a_worker_is_killed(
     flights: Path, alone: str, tmp_path: Path
 ) -> None:
@@ -156,17 +217,24 @@ def test_of_a_folder_of_many_logs_only_what_belongs_to_one_is_fetched(
     for name in (*logs, *beside, "notes.txt", "a/flight.mcap", "a/summary.json"):
         files.pipe_file(f"/flat/{name}", f"what is in {name}".encode())
     monkeypatch.setattr(MemoryFileSystem, "open", noted)
+    inventory = {"inventory.db", "inventory.db-wal"}
+    reads: tuple[tuple[tuple[Study, ...], set[str]], ...] = (
+        ((Study.DETECT, Study.REPLAY, Study.CALIBRATE), set()),
+        ((Study.JUDGE,), {"summary.json", "truth.mcap", *inventory}),
+        ((Study.CODES,), {"evidence/ab/abcd.jpg", *inventory}),
+        ((Study.CODES, Study.JUDGE), beside),
+    )
     try:
         sources = log_sources(["memory://flat"])
         assert len(sources) == 6
         assert read == []
-        for source in sources:
+        for source, (studies, wanted) in itertools.product(sources, reads):
             read.clear()
-            with source.fetched() as log:
+            with source.fetched(studies) as log:
                 here = {str(path.relative_to(log.parent)) for path in log.parent.rglob("*") if path.is_file()}
                 assert log.read_text() == "what is in " + source.place.removeprefix("memory:///flat/")
-            alone = {"flight.mcap", "summary.json"}
-            assert here == (alone if source.place.endswith("/a/flight.mcap") else {log.name, *beside})
+            there = {"summary.json"} if source.place.endswith("/a/flight.mcap") else beside
+            assert here == {log.name} | (wanted & there)
             assert len(read) == len(here)
     finally:
         files.rm("/flat", recursive=True)
