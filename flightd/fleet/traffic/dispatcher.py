@@ -349,7 +349,7 @@ class Dispatcher:
 
     def _fill_batteries(self, now_ms: int) -> None:
         """As long as there is something to count with them, on the ground at least."""
-        works = bool(self.queue.open or self.queue.given)
+        works = bool(self.queue.ready or self.queue.given)
         if not self.docks.are_there or not (works or self._keep_home):
             return
         vertices, holders = self.control.lanes.vertices, self.docks.holders.values()
@@ -390,7 +390,7 @@ class Dispatcher:
                 continue
             self._tries.clear()  # others may still come back, whose air is closed until then
             self._comes_back.discard(drone)
-            may_work = bool(self.queue.open) and now_ms >= self._next_try_ms.get(drone, 0)
+            may_work = bool(self.queue.ready) and now_ms >= self._next_try_ms.get(drone, 0)
             if not (may_work and self._give_tour(drone, now_ms, len(self.control.drones))):
                 self._held |= set(self.control.replan([drone], now_ms))
                 self._settle_tours()
@@ -399,7 +399,7 @@ class Dispatcher:
         ready = [drone for drone in self.control.drones if self._may_begin(drone)]
         for i, drone in enumerate(ready):
             self.queue.retry(self._reach.regained(drone, self._charge[drone]))
-            if not self.queue.open or now_ms < self._next_try_ms.get(drone, 0):
+            if not self.queue.ready or now_ms < self._next_try_ms.get(drone, 0):
                 continue
             plans = self.control.replans
             if not self._give_tour(drone, now_ms, len(ready) - i):

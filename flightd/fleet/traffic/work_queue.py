@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
@@ -26,7 +26,8 @@ class Value(IntEnum):
 @dataclass(frozen=True, slots=True)
 class NodeWork:
     """The places that are counted from one node, and how long that takes.  Of equal `value` the one with the
-    greater `age_s` goes first.  Only that `drone` does it, if one is named."""
+    greater `age_s` goes first.  Only that `drone` does it, if one is named.  Counted are these shelf `levels`
+    (none: all); `run` is the schedule's run that alone asked for it, if one did."""
 
     node: str
     aisle: str
@@ -36,6 +37,12 @@ class NodeWork:
     value: Value = Value.NEVER_COUNTED
     age_s: float = 0.0
     drone: str = ""
+    levels: tuple[int, ...] = ()
+    run: str = ""
+
+    def covers(self, other: NodeWork) -> bool:
+        """Whether all levels of the other are counted with this."""
+        return not self.levels or (bool(other.levels) and {*other.levels} <= {*self.levels})
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +75,11 @@ class WorkQueue:
         self.done: list[str] = []
         self.reasons: dict[str, str] = {}
         self._given_up: set[str] = set()
+        self._again: dict[str, NodeWork] = {}
+        """What is to be counted where a drone counts less just now."""
+        self.runs: Mapping[str, str] = {}
+        """Of a schedule's run why none of its work is begun now; empty where it may be.  Of one that is not
+        here none is."""
 
     @classmethod
     def of(cls, kept: KeptWork) -> WorkQueue:
@@ -82,7 +94,8 @@ class WorkQueue:
     def kept(self) -> KeptWork:
         """As it is to be kept."""
         given_up = tuple(sorted(self._given_up))
-        return KeptWork(tuple(self._work.values()), tuple(self.done), dict(self.reasons), given_up)
+        work = (_both(each, self._again.get(node)) for node, each in self._work.items())
+        return KeptWork(tuple(work), tuple(self.done), dict(self.reasons), given_up)
 
     def work(self, node: str) -> NodeWork:
         """KeyError for a node without work."""
@@ -94,29 +107,53 @@ class WorkQueue:
         return tuple(self._open)
 
     @property
+    def ready(self) -> tuple[str, ...]:
+        """Those that may be begun now."""
+        return tuple(node for node in self.open if self._may_begin(self._work[node]))
+
+    @property
+    def held(self) -> dict[str, str]:
+        """The nodes that wait for the hours of their schedule, and why."""
+        whys = ((node, self.runs.get(self._work[node].run, "")) for node in self.open)
+        return {node: why for node, why in whys if why}
+
+    @property
+    def runs_left(self) -> frozenset[str]:
+        """The schedules' runs of which something waits, or is given."""
+        runs = {self._work[node].run for node in (*self._open, *self._given)}
+        return frozenset(runs - {""})
+
+    def _may_begin(self, work: NodeWork) -> bool:
+        return not work.run or not self.runs.get(work.run, "nothing is known of it")
+
+    def levels_of(self, node: str) -> tuple[int, ...]:
+        """Which are counted there; none: all."""
+        return self._work[node].levels if node in self._work else ()
+
+    @property
     def given(self) -> Mapping[str, str]:
         """Node to drone."""
         return self._given
 
     def ask(self, work: Iterable[NodeWork]) -> None:
-        """More of it, or again; what a drone has already stays with it.  Of what waits or is given, the
-        higher value stays, and of equal ones the drone that is named."""
+        """More of it, or again; what a drone has already stays with it, and what it does not count there
+        waits again then.  Of what waits or is given, the higher value stays, of equal ones the drone that is
+        named, and the levels of both."""
         for each in work:
-            if not self._outweighs(each):
-                self._work[each.node] = each
-            self.reasons.pop(each.node, None)
-            self._given_up.discard(each.node)
-            if each.node in self.done:
-                self.done.remove(each.node)
-            if each.node not in self._given:
-                self._open[each.node] = None
-
-    def _outweighs(self, asked: NodeWork) -> bool:
-        """What is to be done there already says more than what is asked for now."""
-        if asked.node not in self._open and asked.node not in self._given:
-            return False
-        known = self._work[asked.node]
-        return (known.value, known.drone != "") > (asked.value, asked.drone != "")
+            node = each.node
+            waits = node in self._open or node in self._given
+            known = self._work[node] if waits else None
+            if known is not None and node in self._given and not known.covers(each):
+                self._again[node] = _both(each, self._again.get(node))
+                self._work[node] = replace(_both(each, known), levels=known.levels)
+            else:
+                self._work[node] = _both(each, known)
+            self.reasons.pop(node, None)
+            self._given_up.discard(node)
+            if node in self.done:
+                self.done.remove(node)
+            if node not in self._given:
+                self._open[node] = None
 
     def finish(self, node: str) -> None:
         """It is counted; nothing, of a node without work."""
@@ -128,11 +165,15 @@ class WorkQueue:
         self._given_up.discard(node)
         if node not in self.done:
             self.done.append(node)
+        if node in self._again:
+            self.ask([self._again.pop(node)])
 
     def hand_back(self, nodes: Iterable[str], reason: str = "") -> None:
         """They wait again, or are not to be done, for a reason."""
         for node in nodes:
             self._given.pop(node, None)
+            if node in self._again:
+                self._work[node] = _both(self._again.pop(node), self._work[node])
             if reason:
                 self._open.pop(node, None)
                 self.reasons[node] = reason
@@ -183,9 +224,9 @@ class WorkQueue:
         nearest.  It takes as nearly `share_ms` as that gives, a node at least.  Empty where nothing fits."""
         aisles: dict[str, list[NodeWork]] = {}
         for node in self._open:
-            if node in without:
-                continue
             work = self._work[node]
+            if node in without or not self._may_begin(work):
+                continue
             named = bool(drone) and work.drone == drone
             if named or (not work.drone and work.aisle not in busy_aisles):
                 aisles.setdefault(work.aisle, []).append(work)
@@ -223,3 +264,14 @@ class WorkQueue:
         if begin(ordered[-1].node) < begin(ordered[0].node):
             ordered.reverse()
         return sorted(ordered, key=lambda work: -work.value)
+
+
+def _both(asked: NodeWork, known: NodeWork | None) -> NodeWork:
+    """What is asked for, where something is to be done there already.  What somebody else asks for, too, is
+    not bound to a run."""
+    if known is None:
+        return asked
+    stays = (known.value, known.drone != "") > (asked.value, asked.drone != "")
+    kept = known if stays else asked
+    levels = {*known.levels, *asked.levels} if known.levels and asked.levels else ()
+    return replace(kept, levels=tuple(sorted(levels)), run=kept.run if known.run and asked.run else "")

@@ -131,3 +131,57 @@ def test_of_equal_value_the_age_is_the_one_told_last() -> None:
     queue = WorkQueue([work("A1", Value.OLD, 10.0)])
     queue.ask([work("A1", Value.OLD, 20.0)])
     assert queue.work("A1").age_s == 20.0
+
+
+def levels_at(queue: WorkQueue, node: str, *levels: int, run: str = "") -> None:
+    queue.ask([replace(work(node), levels=levels, run=run)])
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "both"), [((1,), (2,), (1, 2)), ((1,), (), ()), ((), (2,), ()), ((2,), (2,), (2,))]
+)
+def test_the_levels_of_all_who_ask_are_counted(
+    first: tuple[int, ...], then: tuple[int, ...], both: tuple[int, ...]
+) -> None:
+    queue = WorkQueue(())
+    levels_at(queue, "A1", *first)
+    levels_at(queue, "A1", *then)
+    assert queue.levels_of("A1") == both
+
+
+def test_levels_that_a_drone_does_not_count_there_wait_again_once_it_is_done() -> None:
+    queue = WorkQueue(())
+    levels_at(queue, "A1", 1)
+    queue.take("a", ["A1"])
+    levels_at(queue, "A1", 2)
+    levels_at(queue, "A1", 1)
+    assert (queue.levels_of("A1"), queue.open) == ((1,), ()), "as it was told"
+    assert WorkQueue.of(queue.kept()).levels_of("A1") == (1, 2), "nobody knows whether it still does"
+    queue.finish("A1")
+    assert (queue.levels_of("A1"), queue.open, queue.done) == ((2,), ("A1",), [])
+    queue.take("a", ["A1"])
+    levels_at(queue, "A1", 3)
+    queue.hand_back(["A1"])
+    assert (queue.levels_of("A1"), queue.open) == ((2, 3), ("A1",))
+
+
+def test_work_of_a_run_is_begun_in_its_hours_alone_unless_somebody_else_asks_for_it() -> None:
+    queue = WorkQueue(())
+    for node in ("A1", "A2"):
+        levels_at(queue, node, run="run-1")
+    levels_at(queue, "A3")
+
+    def begun() -> tuple[str, ...]:
+        nodes = queue.tour(times(), 1_000_000)
+        assert nodes == queue.ready
+        return nodes
+
+    assert begun() == ("A3",), "nothing is known of the run"
+    queue.runs = {"run-1": "these are quiet hours"}
+    assert queue.held == dict.fromkeys(("A1", "A2"), "these are quiet hours")
+    levels_at(queue, "A2")
+    levels_at(queue, "A3", run="run-1")
+    assert begun() == ("A2", "A3")
+    queue.runs = {"run-1": ""}
+    assert {*begun()} == {"A1", "A2", "A3"}
+    assert queue.runs_left == {"run-1"}
