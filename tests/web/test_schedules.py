@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import sqlite3
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -15,6 +16,7 @@ from flightd.config.schema import load_config
 from flightd.ground.access.roles import Role
 from flightd.ground.messages import LinkPicture, PictureKey
 from flightd.ground.schedules.night_shift import StationClock
+from flightd.ground.schedules.schedule_book import FILE
 from flightd.runtime.within import Within
 from flightd.site.site_file import load_site
 from tests.rigs.brisk import BRISK
@@ -149,7 +151,7 @@ async def test_schedules_are_kept_with_their_next_runs_and_one_clear_line_for_ba
         assert (await ask(station, "DELETE", "/schedule-1"))[0] == 200
         assert (await ask(station, "DELETE", "/schedule-1"))[0] == 404
     async with served(NOBODY) as station:
-        assert await ask(station, "GET") == (200, {"kept": False, "schedules": []})
+        assert await ask(station, "GET") == (200, {"kept": False, "schedules": [], "troubles": []})
         assert (await ask(station, "PUT", "/schedule-1", **TUESDAYS))[0] == 400
 
 
@@ -223,3 +225,22 @@ async def test_where_the_site_file_does_not_allow_it_nothing_starts_and_it_is_to
             assert (missed["cause"], missed["why"]) == ("rules", waits["why"])
             assert flight.phase == "preflight"
             assert flight.quiet_s == 0.0, "nobody is missed who attended a start that did not come"
+
+
+@in_real_time
+async def test_one_that_cannot_be_read_is_told_beside_the_others_and_can_be_deleted(tmp_path: Path) -> None:
+    clock = Clock("2026-10-20T12:00")
+    async with served(NOBODY, folder=tmp_path, clock=clock.station) as station:
+        for number, name in ((1, "Aisle A"), (2, "Damaged")):
+            assert (await ask(station, "PUT", f"/schedule-{number}", **{**TUESDAYS, "name": name}))[0] == 200
+        with sqlite3.connect(tmp_path / FILE) as file:
+            file.execute("UPDATE schedule SET kept = '{}' WHERE id = 'schedule-2'")
+        _, listed = await ask(station, "GET")
+        assert [one["id"] for one in listed["schedules"]] == ["schedule-1"]
+        (trouble,) = listed["troubles"]
+        assert (trouble["id"], trouble["name"]) == ("schedule-2", "Damaged")
+        assert trouble["why"].startswith("cannot be read: Object missing required field")
+        _, calendar = await ask(station, "GET", "/calendar?from=2026-10-20&days=1")
+        assert (len(calendar["runs"]), calendar["troubles"]) == (1, [trouble])
+        assert (await ask(station, "DELETE", "/schedule-2"))[0] == 200
+        assert (await ask(station, "GET"))[1]["troubles"] == []

@@ -10,7 +10,7 @@ from typing import Final
 
 from flightd.fleet.vda5050.codec import Version
 from flightd.fleet.vda5050.order import Edge, InstantActions, Node, Order
-from flightd.fleet.vda5050.parts import Action, BlockingType
+from flightd.fleet.vda5050.parts import Action, ActionParameter, BlockingType
 from flightd.fleet.vehicle.abilities import SCAN_SHELF
 
 VERSION: Final = Version.V3_0
@@ -70,9 +70,14 @@ class BaseOrders:
         )
 
 
-def scan() -> Action:
-    """To count everything at a node."""
-    return Action(action_type=SCAN_SHELF, action_id=uuid.uuid4().hex, blocking_type=BlockingType.HARD)
+def scan(levels: Sequence[int] = ()) -> Action:
+    """To count what is seen from a node, on these levels (none: all)."""
+    return Action(
+        action_type=SCAN_SHELF,
+        action_id=uuid.uuid4().hex,
+        blocking_type=BlockingType.HARD,
+        action_parameters=[ActionParameter(key="levels", value=[*levels])] if levels else None,
+    )
 
 
 def instant(kind: str) -> InstantActions:

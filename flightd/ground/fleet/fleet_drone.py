@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -85,7 +85,9 @@ class FleetDrone:
         self._called_off_s = -math.inf
         self._stands_since_s = 0.0
         self.air = DroneAir(name, floor, drone.stands_on)
-        self._faces = {node.id for node in floor.nodes if node.levels}
+        self._faces = {node.id: node.levels for node in floor.nodes}
+        self.levels_of: Callable[[str], Sequence[int]] = lambda _node: ()
+        """Which are to be counted at a node; none: all."""
         drone.on_decided = self._hear_decided
         self._recalled: KeptDrone | None = None
         self.may_start = True
@@ -399,11 +401,13 @@ class FleetDrone:
 
     def _order_step(self, step: _Step, orders: BaseOrders) -> None:
         node = self._node_of(step)
+        levels, faces = self.levels_of(node), {*self._faces.get(node, ())}
         counts = self.drone.standing is not None and self.drone.standing.counts
+        counts &= bool(faces) and not (levels and faces.isdisjoint(levels))
         if step.action.act is Act.FLY:
             step.sequence = orders.node(node)
-        elif step.action.act is Act.COUNT and counts and node in self._faces:
-            action = scan()
+        elif step.action.act is Act.COUNT and counts:
+            action = scan(levels)
             step.sequence, step.count = orders.do_at_end([action]), action.action_id
         else:
             step.sequence = orders.end[1]

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final, TypeVar
 
 import msgspec
@@ -30,7 +31,8 @@ _APPLICATION, _VERSION = 0x666C666C, 1
 """`flfl`: SQLite's application id, so that another program's file is told apart."""
 _SCHEMA = "CREATE TABLE kept (name TEXT PRIMARY KEY, json BLOB NOT NULL) STRICT"
 _WORK_LASTS_S: Final = 600.0
-"""Nobody expects drones to leave for work that was asked for longer before the station began again."""
+"""Nobody expects drones to leave for work that was asked for longer before the station began again, but for
+that of a schedule's run whose time is not over."""
 _TELLS_S: Final = 60.0
 _WAITS_S: Final = 0.2
 """For another process that reads it; orders wait so long."""
@@ -60,13 +62,25 @@ class KeptFloor:
 
 
 @dataclass(frozen=True, slots=True)
+class KeptRun:
+    """A schedule's run: `until_s` (UTC) it may be begun; `held`: why nothing of it was just then."""
+
+    until_s: float
+    held: str = ""
+
+
+NO_RUNS: Final[Mapping[str, KeptRun]] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
 class KeptFleet:
-    """The drones and the work; `utc_s` is when.  `runs` of schedules gave it some of that."""
+    """The drones and the work; `utc_s` is when.  `given` are the runs of schedules that gave it some of that,
+    by their ids."""
 
     drones: Mapping[str, KeptDrone]
     work: KeptWork
     utc_s: float = 0.0
-    runs: tuple[str, ...] = ()
+    given: Mapping[str, KeptRun] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +123,7 @@ class FleetMemory:
         drones: Mapping[str, KeptDrone],
         work: KeptWork,
         *,
-        runs: tuple[str, ...] = (),
+        runs: Mapping[str, KeptRun] = NO_RUNS,
     ) -> None:
         """The fleet flies by these maps from now on, and is so as it begins; nothing else of before is left
         but what people closed.  Where the disk refuses, the maps go with what is kept next."""
@@ -117,7 +131,12 @@ class FleetMemory:
         self._put_fleet(KeptFleet(drones, work, self._utc_s(), runs))
 
     def keep(
-        self, drones: Mapping[str, KeptDrone], work: KeptWork, *, waits: bool, runs: tuple[str, ...] = ()
+        self,
+        drones: Mapping[str, KeptDrone],
+        work: KeptWork,
+        *,
+        waits: bool,
+        runs: Mapping[str, KeptRun] = NO_RUNS,
     ) -> None:
         """Write down how they are, where that changes what the next station has to know; while work `waits`,
         every minute."""
@@ -150,7 +169,7 @@ class FleetMemory:
 
     def read(self) -> tuple[KeptFloor, KeptFleet] | None:
         """What the station before knew; None where none flew a fleet.  Work that waited too long is told as
-        not done."""
+        not done; that of a run, once its time is over, too."""
         if not self._database.file.exists():
             return None
         with self._database.opened() as kept:
@@ -159,9 +178,12 @@ class FleetMemory:
             return None
         if floor.version != __version__:
             raise InputError(f"{self._database.file}: flightd {floor.version} wrote it")
-        if not 0.0 <= self._utc_s() - fleet.utc_s <= _WORK_LASTS_S:
+        now_s = self._utc_s()
+        if not 0.0 <= now_s - fleet.utc_s <= _WORK_LASTS_S:
             over = {*fleet.work.done, *fleet.work.reasons}
-            late = {work.node: TOO_OLD for work in fleet.work.work if work.node not in over}
+            waits = [work for work in fleet.work.work if work.node not in over]
+            lasts = {run for run, given in fleet.given.items() if given.until_s > now_s}
+            late = {work.node: TOO_OLD for work in waits if work.run not in lasts}
             reasons, given_up = {**fleet.work.reasons, **late}, (*fleet.work.given_up, *late)
             fleet = replace(fleet, work=replace(fleet.work, reasons=reasons, given_up=given_up))
         return floor, fleet

@@ -24,7 +24,7 @@ from flightd.ground.fleet.closed_ways import aisle_closure, closure_between
 from flightd.ground.fleet.closure_book import ClosureBook
 from flightd.ground.fleet.fleet_drone import FleetDrone
 from flightd.ground.fleet.fleet_floor import WHOLE_AIR_M, FleetFloor, with_all_pads
-from flightd.ground.fleet.fleet_memory import FleetMemory, KeptDrone, KeptFleet, KeptFloor
+from flightd.ground.fleet.fleet_memory import FleetMemory, KeptDrone, KeptFleet, KeptFloor, KeptRun
 from flightd.ground.fleet.station_traffic import Aside, StationTraffic, pace_of
 from flightd.ground.hub import Hub
 from flightd.ground.messages import Act
@@ -75,8 +75,12 @@ class OwnFleet(VehicleSides):
         self._fleet: tuple[FleetFloor, Mapping[str, FleetDrone], Pace] | None = None
         self._traffic: StationTraffic | None = None
         self._queue = WorkQueue(())
-        self._runs: tuple[str, ...] = ()
-        """Of schedules, whose work it was given."""
+        self._runs: dict[str, float] = {}
+        """Of schedules, whose work it was given, and until when (UTC) each may be begun."""
+        self._starts_by_hours: list[FleetDrone] = []
+        """Those that may leave the ground once it is known again what a run may have begun."""
+        self._over: Mapping[str, str] = {}
+        """Those of which nothing more is begun, and why."""
         self._kept_runs: frozenset[str] = frozenset()
         self._failed_s = -math.inf
         self._compared: dict[str, FloorStatus] = {}
@@ -138,6 +142,7 @@ class OwnFleet(VehicleSides):
             self._hear_all()
         while True:
             try:
+                self._end_runs()
                 await self._assemble()
                 if self._traffic is not None:
                     await self._traffic.step(int(loop.time() * 1000), self._aside)
@@ -201,7 +206,13 @@ class OwnFleet(VehicleSides):
             drone.recall(fleet.drones[name])
             drone.may_start = floor.floors[name].unattended_start
         self._compared, self._queue = dict(floor.floors), WorkQueue.of(fleet.work)
-        self._runs, self._kept_runs = fleet.runs, frozenset(fleet.runs)
+        self._runs = {run: given.until_s for run, given in fleet.given.items()}
+        self._kept_runs = frozenset(self._runs)
+        self._queue.runs = {run: given.held for run, given in fleet.given.items()}
+        if self._queue.runs_left:  # its hours may have changed since
+            self._starts_by_hours = [drone for drone in drones.values() if drone.may_start]
+            for drone in self._starts_by_hours:
+                drone.may_start = False
         await self._begin(made, drones, pace_of(floor.standings.values()))
 
     async def _made(self, floors: Mapping[str, FloorStatus], stands: Mapping[str, str]) -> FleetFloor:
@@ -219,7 +230,7 @@ class OwnFleet(VehicleSides):
 
     async def _keep_in_mind(self, drones: Mapping[str, KeptDrone], queue: WorkQueue) -> None:
         # as it is now: more may be asked for while it is written down beside the loop
-        work, waits, runs = queue.kept(), bool(queue.open or queue.given), self._runs
+        work, waits, runs = queue.kept(), bool(queue.open or queue.given), self._given_runs
         if await self._write(lambda memory: memory.keep(drones, work, waits=waits, runs=runs)):
             self._kept_runs = frozenset(runs)
 
@@ -290,7 +301,7 @@ class OwnFleet(VehicleSides):
         for drone in drones.values():
             drone.look()
         kept = {name: drone.kept() for name, drone in drones.items()}
-        work, runs = self._queue.kept(), self._runs
+        work, runs = self._queue.kept(), self._given_runs
         if await self._write(lambda memory: memory.begin(floor, kept, work, runs=runs)):
             self._kept_runs = frozenset(runs)
 
@@ -347,13 +358,47 @@ class OwnFleet(VehicleSides):
         """The work of a run is written down as given, with the run's id."""
         return run in self._kept_runs
 
-    def take_run(self, run: str, worth: Mapping[str, Worth]) -> None:
-        """Have the nodes of a schedule's run visited, once; `knows_run` says when that is written down.
+    def take_run(
+        self, run: str, worth: Mapping[str, Worth], *, until_s: float = 0.0, levels: Sequence[int] = ()
+    ) -> None:
+        """Have the nodes of a schedule's run visited, once, and these levels counted there (none: all);
+        `knows_run` says when that is written down.  Until `until_s` (UTC) it outlives a station that ends.
         InputError for a node that is not there, UnavailableError where the fleet does not fly."""
         traffic = self._asked_traffic()
         if not self.has_run(run):
-            traffic.ask_worth(worth)
-            self._runs = (*self._runs, run)[-_MOST_RUNS:]
+            traffic.ask_worth(worth, levels=levels, run=run)
+            self._runs = dict([*self._runs.items(), (run, until_s)][-_MOST_RUNS:])
+            self._queue.runs = {**self._queue.runs, run: ""}
+
+    @property
+    def runs_left(self) -> frozenset[str]:
+        """Those of which something waits, or is given to a drone."""
+        return self._queue.runs_left
+
+    def has_begun(self, nodes: Sequence[str]) -> bool:
+        """Whether one of these was visited, or a drone is to visit it, since they were asked for."""
+        return not {*nodes}.isdisjoint((*self._queue.done, *self._queue.given))
+
+    def let_runs(self, why_not: Mapping[str, str], over: Mapping[str, str]) -> None:
+        """Of these runs why nothing is begun now, empty where it may be; what waits of those that are `over`
+        is given up, for these reasons."""
+        known = {**self._queue.runs, **why_not}
+        self._queue.runs = {run: known[run] for run in known if run in self._runs}
+        self._over = dict(over)
+        for drone in self._starts_by_hours:
+            drone.may_start = True
+        self._starts_by_hours.clear()
+
+    @property
+    def _given_runs(self) -> dict[str, KeptRun]:
+        held = self._queue.runs
+        return {run: KeptRun(until_s, held.get(run, "")) for run, until_s in self._runs.items()}
+
+    def _end_runs(self) -> None:
+        if self._over:
+            for node in self._queue.open:
+                if why := self._over.get(self._queue.work(node).run):
+                    self._queue.give_up(node, why)
 
     def left_of(self, nodes: Sequence[str]) -> tuple[str, ...]:
         """Which of these it has not visited, or was asked for since."""
@@ -407,7 +452,7 @@ class OwnFleet(VehicleSides):
         """How it is, as JSON has it."""
         told = {} if self._traffic is None else self._traffic.document()
         asked = () if self._traffic is None else self._traffic.asked
-        held: Mapping[str, str] = told.get("held_back", {})
+        held: Mapping[str, str] = {**self._queue.held, **told.get("held_back", {})}
         work = {
             "open": [*(node for node in self._queue.open if node not in held), *asked],
             "given": dict(self._queue.given),

@@ -135,6 +135,7 @@ class StationTraffic:
         self._told: dict[str, Any] = {}
         self._now_ms = self._read_ms = 0
         for name, drone in drones.items():
+            drone.levels_of = queue.levels_of
             pad = floor.pad(name)
             self._control.enter(name, drone.air.stand if drone.air.rests else pad, ends=(pad,))
 
@@ -160,14 +161,19 @@ class StationTraffic:
         lacks."""
         self.ask_worth(dict.fromkeys(nodes, Worth(Value.ASKED)), drone)
 
-    def ask_worth(self, worth: Mapping[str, Worth], drone: str = "") -> None:
-        """The same, for nodes that are worth more or less."""
+    def ask_worth(
+        self, worth: Mapping[str, Worth], drone: str = "", *, levels: Sequence[int] = (), run: str = ""
+    ) -> None:
+        """The same, for nodes that are worth more or less, of which these shelf levels are counted (none:
+        all), for a schedule's run."""
         if unknown := [node for node in worth if node not in self._floor.lanes.column_of]:
             raise InputError(f"no node is called {unknown[0]}")
         for i, node in enumerate(self._floor.nodes):
             its = worth.get(node.id)
             if its is not None:
-                work = NodeWork(node.id, node.aisle, i, (), self._dwell_ms, its.value, its.age_s, drone)
+                work = NodeWork(
+                    node.id, node.aisle, i, (), self._dwell_ms, its.value, its.age_s, drone, (*levels,), run
+                )
                 self._asked.append(work)
         if not self._decides:
             self._take_asked()

@@ -50,9 +50,26 @@ class ScheduledFleet(Protocol):
         fly."""
         ...
 
-    def take_run(self, run: str, worth: Mapping[str, Worth]) -> None:
-        """Have the nodes of a run visited, once; `knows_run` says when that is written down.  InputError for
-        a node that is not there, UnavailableError where the fleet does not fly."""
+    def take_run(
+        self, run: str, worth: Mapping[str, Worth], *, until_s: float, levels: Sequence[int]
+    ) -> None:
+        """Have the nodes of a run visited, once, and these levels counted there (none: all); `knows_run` says
+        when that is written down.  Until `until_s` (UTC) it outlives a station that ends.  InputError for a
+        node that is not there, UnavailableError where the fleet does not fly."""
+        ...
+
+    @property
+    def runs_left(self) -> frozenset[str]:
+        """Those of which something waits, or is given to a drone."""
+        ...
+
+    def has_begun(self, nodes: Sequence[str]) -> bool:
+        """Whether one of these was visited, or a drone is to visit it, since they were asked for."""
+        ...
+
+    def let_runs(self, why_not: Mapping[str, str], over: Mapping[str, str]) -> None:
+        """Of these runs why nothing is begun now, empty where it may be; what waits of those that are `over`
+        is given up, for these reasons."""
         ...
 
     def left_of(self, nodes: Sequence[str]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import asyncio
 import logging
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final, Protocol
@@ -34,8 +34,19 @@ from flightd.ground.messages import Act
 from flightd.ground.missions.mission_book import MissionBook
 from flightd.ground.schedules.fleet_runs import ScheduledFleet, fleet_objection
 from flightd.ground.schedules.kept import CountAll, CountByValue, CountMission, Schedule
+from flightd.ground.schedules.run_hours import hours_of_runs, until_s
 from flightd.ground.schedules.schedule_book import MOST_RUNS, ORDERED, Run, RunState, ScheduleBook
-from flightd.ground.schedules.start_rules import PLAN, Cause, Objection, is_flying_plan, objection
+from flightd.ground.schedules.start_rules import (
+    CHANGED,
+    OFF,
+    PLAN,
+    QUIET,
+    SUSPENDED,
+    Cause,
+    Objection,
+    is_flying_plan,
+    objection,
+)
 from flightd.ground.schedules.work import Work, valued_work, work_of
 from flightd.ground.valued_nodes import valued_nodes
 
@@ -44,10 +55,7 @@ _AT_ONCE, _MOST_WAITING = 1, 8
 _MOST_WORDS = 300
 _GIVEN_UP_S: Final = 3600.0
 """So long after the end of its time a run that was ordered waits for the drone to be heard."""
-_QUIET: Final = Objection(Cause.QUIET, "these are quiet hours")
 _NO_ANSWER: Final = "the drone did not answer in time"
-_ALL_LEVELS: Final = Objection(Cause.WORK, "the fleet counts all levels")
-_OFF: Final = Objection(Cause.OFF, "the station was off, or its clock jumped")
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +146,8 @@ class NightShift:
         self._trouble: dict[str, str] = {}
         self._left: dict[str, tuple[str, tuple[str, ...]]] = {}
         """Of each schedule of a mission that the fleet has: the plan of its newest run, and the nodes."""
+        self._of_fleet: dict[str, tuple[Schedule, Run]] = {}
+        """By their plans the runs that were given to the fleet, as they were read last."""
         self._rests: dict[str, float] = {}
         """Until when nothing is ordered for a schedule, by the loop's clock: its drone has just refused, or
         what it counts could not be known."""
@@ -155,12 +165,16 @@ class NightShift:
     async def step(self) -> None:
         """Start what is due, and write down what was missed."""
         wanted: set[str] = set()
+        left = frozenset() if self._fleet is None else self._fleet.runs_left
+        self._of_fleet.clear()
         try:
-            schedules = await self._threads.run(self._book.schedules)
+            schedules, damaged = await self._threads.run(self._book.schedules)
             self._note("", "")
         except FlightdError as err:
-            schedules = []
+            schedules, damaged = [], []
             self._note("", str(err))
+        for one in damaged:
+            self._note(one.id, f"schedule {one.name}: {one.why}")
         for schedule in schedules:
             try:
                 if await self._look(schedule):
@@ -168,9 +182,16 @@ class NightShift:
                 self._note(schedule.id, "")
             except FlightdError as err:  # nothing is started that is not written down
                 self._note(schedule.id, f"schedule {schedule.kept.name}: {err}")
-        self._trouble = {of: text for of, text in self._trouble.items() if text}
+        noted = {"", "step", *(one.id for one in schedules), *(one.id for one in damaged)}
+        self._trouble = {of: text for of, text in self._trouble.items() if text and of in noted}
+        if self._fleet is not None:
+            self._bind_runs(self._fleet, left, is_whole=not self._trouble.keys() - {"step"})
         for name, drone in self._drones.items():
             drone.attends_run = name in wanted or is_flying_plan(drone.heard)
+
+    def _bind_runs(self, fleet: ScheduledFleet, left: Collection[str], *, is_whole: bool) -> None:
+        now_s = self._clock.utc_ns() / 1e9
+        fleet.let_runs(*hours_of_runs(left, self._of_fleet, fleet.has_begun, now_s, is_whole=is_whole))
 
     def _note(self, of: str, trouble: str) -> None:
         if trouble and self._trouble.get(of) != trouble:
@@ -184,6 +205,7 @@ class NightShift:
         runs = {
             run.day: run for run in await self._threads.run(self._book.runs, schedule.id, MOST_RUNS, oldest)
         }
+        self._of_fleet |= {run.plan: (schedule, run) for run in runs.values() if run.state in ORDERED}
         started = [run for run in runs.values() if run.state is RunState.STARTED]
         if started and isinstance(schedule.kept.count, CountMission):
             newest = max(started, key=lambda run: run.day)
@@ -192,18 +214,21 @@ class NightShift:
         for run in unanswered:
             await self._resume(schedule, run, now)
         if not schedule.kept.enabled:
+            await self._end_waiting(schedule, runs.values(), SUSPENDED)
             return bool(unanswered)
         since = utc_time(schedule.since_ns)
         ordered = [day for day, run in runs.items() if run.state in ORDERED]
         told = [day for day, run in runs.items() if run.state is RunState.MISSED]
         decision = decide(schedule.rule, since, ordered, told, now)
         for missed in decision.missed:
-            await self._miss(schedule, missed, runs.get(missed.day))
+            await self._miss(schedule, missed, runs.pop(missed.day, None))
+        others = [run for day, run in runs.items() if decision.due is None or day != decision.due.day]
+        await self._end_waiting(schedule, others, CHANGED)
         if decision.due is None:
             return bool(unanswered)
         known = runs.get(decision.due.day)
         if decision.is_quiet:
-            await self._wait(schedule, decision.due, known, _QUIET)
+            await self._wait(schedule, decision.due, known, QUIET)
             return bool(unanswered)
         await self._begin(schedule, decision.due, known, now)
         return True
@@ -225,16 +250,13 @@ class NightShift:
         if floor is None and welcome is not None and status is not None:
             floor = welcome.floor
         if against is not None or floor is None:
-            await self._wait(schedule, due, known, against or _OFF)
+            await self._wait(schedule, due, known, against or OFF)
             return
         try:
             work = await self._work(schedule, floor, fleet, now)
         except FlightdError as err:
             self._rest(schedule)
             await self._wait(schedule, due, known, Objection(Cause.WORK, str(err)))
-            return
-        if fleet is not None and work.levels:
-            await self._wait(schedule, due, known, _ALL_LEVELS)
             return
         session = "" if fleet is not None or welcome is None else welcome.session
         run = Run(
@@ -261,10 +283,25 @@ class NightShift:
         """FlightdError where that is nothing, or cannot be known."""
         count = schedule.kept.count
         if not isinstance(count, CountByValue):
-            return await self._threads.run(work_of, schedule, count, floor, self._missions, self._store, now)
+            first = await self._urgent(schedule) if isinstance(count, CountAll) else {}
+            return await self._threads.run(
+                work_of, schedule, count, floor, self._missions, self._store, now, first
+            )
         worth = worth_of(await self._facts.of(schedule.kept.site))
         chosen = valued_nodes(floor, worth, count) if fleet is None else fleet.valued(worth, count)
         return valued_work(floor, worth, chosen)
+
+    async def _urgent(self, schedule: Schedule) -> dict[str, Worth]:
+        """The nodes of its site at which something is asked for, or is not what the books say; none where
+        that cannot be known."""
+        if self._store is None:
+            return {}
+        try:
+            worth = worth_of(await self._facts.of(schedule.kept.site))
+        except FlightdError as err:  # all is counted in its turn, whatever the books are
+            _LOG.warning("schedule %s: what goes first is not known: %s", schedule.kept.name, err)
+            return {}
+        return {node: its for node, its in worth.items() if its.value >= Value.CONTRADICTED}
 
     def _fleet_of(self, drone: ScheduledDrone) -> ScheduledFleet | None:
         """That of which a drone is one."""
@@ -275,7 +312,8 @@ class NightShift:
         down the run is none that was started."""
         if not fleet.has_run(run.plan):
             try:
-                fleet.take_run(run.plan, await self._worth(schedule, run.nodes))
+                worth = await self._worth(schedule, run.nodes)
+                fleet.take_run(run.plan, worth, until_s=until_s(schedule, run), levels=run.levels)
             except FlightdError as err:
                 await self._refused(schedule, run, RunState.WAITING, str(err))
                 return
@@ -288,7 +326,7 @@ class NightShift:
         """Go on with a run that was ordered and not answered: the link was lost, or the station ended."""
         drone = self._drones.get(run.drone)
         status = None if drone is None else drone.heard
-        over_s = (self._clock.utc_ns() - run.due_ns) / 1e9 - schedule.kept.late_minutes * 60
+        over_s = self._clock.utc_ns() / 1e9 - until_s(schedule, run)
         fleet = None if drone is None or run.session else self._fleet_of(drone)
         if drone is not None and fleet is not None:
             may = over_s < 0 and not schedule.rule.is_quiet(now) and self._objection(schedule, drone) is None
@@ -387,10 +425,21 @@ class NightShift:
     async def _miss(self, schedule: Schedule, missed: Occurrence, known: Run | None) -> None:
         """Tell once that a run's time is over, with what kept it."""
         kept = known is not None and known.state is RunState.WAITING
-        why = Objection(Cause(known.cause), known.why) if known is not None and kept else _OFF
-        run = _not_ordered(schedule, missed, RunState.MISSED, why)
+        why = Objection(Cause(known.cause), known.why) if known is not None and kept else OFF
+        await self._tell_missed(schedule, _not_ordered(schedule, missed, RunState.MISSED, why))
+
+    async def _end_waiting(self, schedule: Schedule, runs: Iterable[Run], changed: Objection) -> None:
+        """Tell of what is due no more, and waits in the book: the schedule was `changed` since, or what kept
+        it is long ago."""
+        for run in runs:
+            if run.state is RunState.WAITING and run.due_ns <= self._clock.utc_ns():
+                is_old = schedule.since_ns <= run.due_ns and schedule.kept.enabled
+                cause, why = (run.cause, run.why) if is_old else (changed.cause.value, changed.why)
+                await self._tell_missed(schedule, replace(run, state=RunState.MISSED, cause=cause, why=why))
+
+    async def _tell_missed(self, schedule: Schedule, run: Run) -> None:
         await self._write(run)
-        self._write_down(schedule, run, "missed", f"{run.day}: {why.why}")
+        self._write_down(schedule, run, "missed", f"{run.day}: {run.why}")
 
     async def _worth(self, schedule: Schedule, nodes: Sequence[str]) -> dict[str, Worth]:
         """What a person chose goes before what is only the oldest, which is worth less from one to the next.
@@ -400,7 +449,9 @@ class NightShift:
                 worth = worth_of(await self._facts.of(schedule.kept.site))
                 return {node: worth.get(node, UNKNOWN) for node in nodes}
             case CountAll():
-                return {node: Worth(Value.OLD, float(len(nodes) - i)) for i, node in enumerate(nodes)}
+                first = await self._urgent(schedule)
+                old = {node: Worth(Value.OLD, float(len(nodes) - i)) for i, node in enumerate(nodes)}
+                return {node: first.get(node, its) for node, its in old.items()}
             case _:
                 return dict.fromkeys(nodes, Worth(Value.ASKED))
 

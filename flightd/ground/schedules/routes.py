@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import date, datetime
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from flightd.ground.bounded import Threads
 from flightd.ground.json_http import AnswerTo, as_json, or_refused, said
 from flightd.ground.schedules.kept import Kept, Schedule
 from flightd.ground.schedules.run_calendar import calendar_of, read_days
-from flightd.ground.schedules.schedule_book import Run, ScheduleBook
+from flightd.ground.schedules.schedule_book import DamagedSchedule, Run, ScheduleBook
 
 _AT_ONCE, _MOST_WAITING = 1, 32
 _MOST_BYTES = 16 << 10
@@ -46,15 +46,12 @@ class _Desk:
         self._threads = Threads(_AT_ONCE, _MOST_WAITING, "too many changes to schedules wait already")
 
     async def listed(self, request: Request) -> Response:
-        """The schedules of `?site=NAME` (of all), each with its next runs and the newest one."""
+        """The schedules of `?site=NAME` (of all), each with its next runs and the newest one; and what is
+        wrong with those that cannot be read."""
         if self._book is None:
-            return as_json({"kept": False, "schedules": []})
-        return as_json(
-            {
-                "kept": True,
-                "schedules": await self._threads.run(self._told, request.query_params.get("site", "")),
-            }
-        )
+            return as_json({"kept": False, "schedules": [], "troubles": []})
+        schedules, troubles = await self._threads.run(self._told, request.query_params.get("site", ""))
+        return as_json({"kept": True, "schedules": schedules, "troubles": troubles})
 
     async def keep(self, request: Request) -> Response:
         """Keep a schedule, new or in place of the one with its id, from now on."""
@@ -87,17 +84,19 @@ class _Desk:
     def _calendar(self, first: date, days: int) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
         book, now = self._kept_in(), self._now()
         runs: list[dict[str, Any]] = []
-        troubles: list[dict[str, str]] = []
-        for schedule in book.schedules():
+        schedules, damaged = book.schedules()
+        troubles = _troubles(damaged)
+        for schedule in schedules:
             try:
                 runs += calendar_of(schedule, book.runs(schedule.id, since=first), first, days, now)
             except FlightdError as err:
                 troubles.append({"name": schedule.kept.name, "why": str(err)})
         return runs, troubles
 
-    def _told(self, site: str) -> list[dict[str, Any]]:
+    def _told(self, site: str) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
         book, now = self._kept_in(), self._now()
-        return [told(schedule, now, book.runs(schedule.id, 1)) for schedule in book.schedules(site)]
+        schedules, damaged = book.schedules(site)
+        return [told(each, now, book.runs(each.id, 1)) for each in schedules], _troubles(damaged)
 
     def _now(self) -> datetime:
         return utc_time(self._utc_ns())
@@ -108,6 +107,10 @@ class _Desk:
                 "this station has no folder to keep schedules in", remedy="start it with --folder"
             )
         return self._book
+
+
+def _troubles(damaged: Sequence[DamagedSchedule]) -> list[dict[str, str]]:
+    return [{"id": one.id, "name": one.name, "why": one.why} for one in damaged]
 
 
 def told(schedule: Schedule, now: datetime, newest: list[Run] | tuple[()]) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import enum
 import json
-import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
@@ -92,6 +91,15 @@ class Run:
     why: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class DamagedSchedule:
+    """One that cannot be read, and why: nothing starts by it."""
+
+    id: str
+    name: str
+    why: str
+
+
 class ScheduleBook:
     """The file in `folder`, made with the first schedule.  Safe from any thread and process; each change is
     whole or none, and on the disk when it is done.
@@ -107,22 +115,33 @@ class ScheduleBook:
             schema=SCHEMA,
         )
 
-    def schedules(self, site: str = "") -> list[Schedule]:
-        """All, or those of a site, by their names."""
+    def schedules(self, site: str = "") -> tuple[list[Schedule], list[DamagedSchedule]]:
+        """All, or those of a site, by their names; and those that cannot be read."""
         if not self._database.file.exists():
-            return []
+            return [], []
         with self._database.opened() as book:
             rows = book.execute(
-                "SELECT id, kept, since_ns FROM schedule WHERE ? IN ('', site) ORDER BY name COLLATE NOCASE",
+                "SELECT id, name, kept, since_ns FROM schedule WHERE ? IN ('', site)"
+                " ORDER BY name COLLATE NOCASE",
                 (site,),
             ).fetchall()
-            return [Schedule(str(one), _kept(text), int(since)) for one, text, since in rows]
+        schedules: list[Schedule] = []
+        damaged: list[DamagedSchedule] = []
+        for identity, name, text, since_ns in rows:
+            try:
+                schedules.append(Schedule(str(identity), _kept(text), int(since_ns)))
+            except msgspec.MsgspecError as err:
+                damaged.append(DamagedSchedule(str(identity), str(name), f"cannot be read: {err}"))
+        return schedules, damaged
 
     def keep(self, identity: str, kept: Kept, now_ns: int) -> Schedule:
-        """Keep a schedule from now on, in place of the one with its id.  RunError for a name that the site's
-        schedules have already."""
+        """Keep a schedule from now on, in place of the one with its id; what that has due stays due where its
+        runs have the same times.  RunError for a name that the site's schedules have already."""
+        since_ns = now_ns
         with self._database.changed() as book:
-            known = book.execute("SELECT 1 FROM schedule WHERE id = ?", (identity,)).fetchone()
+            known = book.execute("SELECT kept, since_ns FROM schedule WHERE id = ?", (identity,)).fetchone()
+            if known and _has_times_of(kept, str(known[0])):
+                since_ns = int(known[1])
             if not known and book.execute("SELECT count(*) FROM schedule").fetchone()[0] >= MOST_SCHEDULES:
                 raise UnavailableError(f"{MOST_SCHEDULES} schedules are kept already", remedy="delete some")
             taken = "SELECT 1 FROM schedule WHERE site = ? AND name = ? AND id != ?"
@@ -133,9 +152,9 @@ class ScheduleBook:
                 "INSERT INTO schedule VALUES (?, ?, ?, ?, ?) ON CONFLICT (id) DO UPDATE SET"
                 " site = excluded.site, name = excluded.name, kept = excluded.kept,"
                 " since_ns = excluded.since_ns",
-                (identity, kept.site, kept.name, text, now_ns),
+                (identity, kept.site, kept.name, text, since_ns),
             )
-        return Schedule(identity, kept, now_ns)
+        return Schedule(identity, kept, since_ns)
 
     def delete(self, identity: str) -> None:
         """Forget a schedule and its runs.  InputError where there is none."""
@@ -166,10 +185,21 @@ class ScheduleBook:
 
 
 def _kept(text: object) -> Kept:
+    """MsgspecError for what is none."""
+    return msgspec.json.decode(str(text), type=Kept)
+
+
+def _has_times_of(kept: Kept, before: str) -> bool:
+    """Whether a schedule has runs when the one before had some; one that was suspended had none."""
     try:
-        return msgspec.json.decode(str(text), type=Kept)
-    except msgspec.MsgspecError as err:
-        raise sqlite3.DatabaseError(f"a schedule in it cannot be read: {err}") from None
+        known = _kept(before)
+    except msgspec.MsgspecError:
+        return False
+    return known.enabled and _times(known) == _times(kept)
+
+
+def _times(kept: Kept) -> tuple[object, ...]:
+    return kept.at, kept.zone, frozenset(kept.weekdays), kept.every_days, kept.first
 
 
 def _run(row: Sequence[str | int]) -> Run:

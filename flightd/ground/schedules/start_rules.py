@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import Final
 
 from flightd.adapters.ground_link.messages.answers import Welcome
 from flightd.adapters.ground_link.messages.base import Role
@@ -34,6 +35,7 @@ class Cause(enum.StrEnum):
     WORK = "work"
     REFUSED = "refused"
     OFF = "off"
+    CHANGED = "changed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,12 @@ class Objection:
 
     cause: Cause
     why: str
+
+
+QUIET: Final = Objection(Cause.QUIET, "these are quiet hours")
+OFF: Final = Objection(Cause.OFF, "the station was off, or its clock jumped")
+CHANGED: Final = Objection(Cause.CHANGED, "the schedule was changed")
+SUSPENDED: Final = Objection(Cause.CHANGED, "the schedule was suspended")
 
 
 def objection(

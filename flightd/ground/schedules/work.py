@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
@@ -40,9 +40,10 @@ def work_of(
     missions: MissionBook,
     store: GroundStore | None,
     now: datetime,
+    first: Collection[str] = (),
 ) -> Work:
-    """What a run of the schedule that has this `count` counts now; reads files.  InputError where that is
-    nothing, or cannot be known."""
+    """What a run of the schedule that has this `count` counts now; reads files.  The nodes that are to come
+    `first` are exceptions, too.  InputError where that is nothing, or cannot be known."""
     if isinstance(count, CountMission):
         mission = missions.mission(count.mission)
         if mission.site != schedule.kept.site:
@@ -55,7 +56,7 @@ def work_of(
             "all of a site is counted by the ground store, and there is none", remedy="give --store FILE"
         )
     following = [one.at for one in schedule.rule.next_occurrences(now, _MOST_RUNS)]
-    known = _counts(floor, list(site_stock(store, schedule.kept.site)))
+    known = _counts(floor, list(site_stock(store, schedule.kept.site)), first)
     nodes = run_nodes(known, now, timedelta(days=count.within_days), following)
     return Work(nodes[:MOST_NODES])
 
@@ -82,10 +83,10 @@ def _aisle_nodes(floor: FloorStatus, aisles: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _counts(floor: FloorStatus, stock: Sequence[dict[str, Any]]) -> list[NodeCount]:
+def _counts(floor: FloorStatus, stock: Sequence[dict[str, Any]], first: Collection[str]) -> list[NodeCount]:
     """The nodes to be counted, aisle by aisle as on the floor, with the worst that is known of each."""
     oldest: dict[str, datetime | None] = {}
-    exceptions = set()
+    exceptions = {*first}
     for place in stock:
         node, state = place["node"], LocationState(place["state"])
         if state in {LocationState.UNREADABLE, LocationState.OCCLUDED}:
@@ -95,6 +96,4 @@ def _counts(floor: FloorStatus, stock: Sequence[dict[str, Any]]) -> list[NodeCou
         at = None if never else utc_time(ns)
         before = oldest.get(node, at)
         oldest[node] = None if at is None or before is None else min(at, before)
-    return [
-        NodeCount(node.id, node.id in exceptions, oldest.get(node.id)) for node in floor.nodes if node.levels
-    ]
+    return [NodeCount(node.id, node.id in exceptions, oldest.get(node.id)) for node in shelved_nodes(floor)]

@@ -10,17 +10,19 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from flightd.adapters.ground_link.floor_status import floor_status
 from flightd.adapters.ground_link.messages.answers import Welcome
 from flightd.adapters.ground_link.messages.base import Role
+from flightd.adapters.ground_link.messages.counts import NodeCount
 from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Phase
 from flightd.fleet.traffic.valued_work import PlaceFacts
 from flightd.fleet.traffic.work_queue import Value
-from flightd.ground.fleet.fleet_memory import FleetMemory
+from flightd.ground.fleet.fleet_memory import TOO_OLD, FleetMemory
 from flightd.ground.missions.mission_book import Mission, MissionBook
 from flightd.ground.schedules.kept import CountAisles, CountByValue, CountMission, Kept, QuietHours
 from flightd.ground.schedules.night_shift import NightShift, StationClock
@@ -106,11 +108,17 @@ class Station:
         return runs[0] if runs else None
 
 
-def night(tmp_path: Path, go: Callable[[Station], Coroutine[Any, Any, None]], kept: Kept = NIGHTLY) -> None:
+def night(
+    tmp_path: Path,
+    go: Callable[[Station], Coroutine[Any, Any, None]],
+    kept: Kept = NIGHTLY,
+    *,
+    counts: bool = False,
+) -> None:
     async def with_station(fleet: PaperFleet) -> None:
         await go(Station(fleet, tmp_path, kept))
 
-    fly(with_station, "ab", memory=FleetMemory(tmp_path), unattended=True)
+    fly(with_station, "ab", memory=FleetMemory(tmp_path), unattended=True, counts=counts)
 
 
 def open_or_given(fleet: PaperFleet) -> set[str]:
@@ -242,14 +250,137 @@ def test_in_quiet_hours_it_waits_and_is_caught_up(tmp_path: Path) -> None:
     night(tmp_path, go, quiet)
 
 
-def test_levels_are_refused_for_a_fleet_counts_all(tmp_path: Path) -> None:
+HELD = Kept("hall", "A", "a", CountAisles(("A",)), "22:00", "UTC", quiet=(QuietHours("22:10", "23:00"),))
+
+
+async def given_to_nobody(station: Station) -> Run:
+    """What is due is handed to the fleet, and no drone has the battery for it."""
+    for drone in station.fleet.drones.values():
+        drone.left_s = 30.0
+    run = await station.look()
+    assert run is not None
+    plan = run.plan
+    await until(lambda: station.fleet.own.knows_run(plan), 30)
+    run = await station.look()
+    assert run is not None
+    assert (run.state, open_or_given(station.fleet)) == (RunState.STARTED, AISLE)
+    return run
+
+
+async def charged(station: Station) -> None:
+    """Whoever may fly now has been given something."""
+    for drone in station.fleet.drones.values():
+        drone.left_s = 900.0
+    await asyncio.sleep(20.0)
+
+
+def test_quiet_hours_keep_drones_from_leaving_for_what_was_handed_over_before(tmp_path: Path) -> None:
     async def go(station: Station) -> None:
+        fleet = station.fleet
+        await given_to_nobody(station)
+        await station.look(DUE + timedelta(minutes=10))
+        await charged(station)
+        assert fleet.state["not_done"] == dict.fromkeys(AISLE, "these are quiet hours")
+        assert {drone.phase for drone in fleet.drones.values()} == {Phase.PREFLIGHT}
+        fleet.own.ask(["A3"])
+        await until(lambda: {*fleet.state["given"]} == {"A3"}, 30)
+        await station.look(DUE + timedelta(minutes=60))
+        await until(lambda: {*fleet.state["given"], *fleet.state["done"]} >= {"A2", "A4"}, 100)
+
+    night(tmp_path, go, HELD)
+
+
+@pytest.mark.parametrize(
+    ("minutes", "change", "why"),
+    [
+        (121, {}, "its time is over"),
+        (121, {"quiet": (QuietHours("23:30", "06:00"),)}, "these are quiet hours"),
+        (5, {"enabled": False}, "the schedule was suspended"),
+        (5, None, "there is no such schedule any more"),
+    ],
+)
+def test_what_nobody_leaves_for_in_its_time_is_told_as_not_done(
+    tmp_path: Path, minutes: int, change: dict[str, Any] | None, why: str
+) -> None:
+    async def go(station: Station) -> None:
+        await given_to_nobody(station)
+        if change is None:
+            station.book.delete("schedule-1")
+        else:
+            station.book.keep("schedule-1", msgspec.structs.replace(NIGHTLY, **change), station.utc_ns())
+        await station.look(DUE + timedelta(minutes=minutes))
+        await charged(station)
+        assert station.fleet.state["not_done"] == dict.fromkeys(AISLE, why)
+        assert open_or_given(station.fleet) == set()
+        assert {drone.phase for drone in station.fleet.drones.values()} == {Phase.PREFLIGHT}
+
+    night(tmp_path, go)
+
+
+def test_a_run_that_was_begun_in_its_time_goes_on_after_it(tmp_path: Path) -> None:
+    async def go(station: Station) -> None:
+        fleet = station.fleet
+        fleet.drones["b"].left_s = 30.0
+        fleet.drones["a"].left_s = 90.0
+        await station.look()
+        await until(lambda: bool(fleet.state["given"]), 30)
+        await station.look(DUE + timedelta(minutes=121))
+        assert fleet.state["open"], "one tour is not enough"
+        await charged(station)
+        await until(lambda: {*fleet.state["done"]} == AISLE, 300)
+
+    night(tmp_path, go)
+
+
+@pytest.mark.parametrize(("minutes", "why"), [(60, ""), (121, TOO_OLD)])
+def test_the_work_of_a_run_outlives_a_station_until_its_time_is_over(
+    tmp_path: Path, minutes: int, why: str
+) -> None:
+    now_s = DUE.timestamp()
+
+    async def go(fleet: PaperFleet) -> None:
+        nonlocal now_s
+        station = Station(fleet, tmp_path)
+        await given_to_nobody(station)
+        await fleet.kill()
+        now_s += minutes * 60
+        fleet.start_again()
+        await until(lambda: fleet.state["flies"], 60)
+        station.begin()
+        await station.look(DUE + timedelta(minutes=minutes))
+        assert fleet.state["not_done"] == (dict.fromkeys(AISLE, why) if why else {})
+        await charged(station)
+        assert bool(open_or_given(fleet)) is (not why)
+
+    fly(go, "ab", memory=FleetMemory(tmp_path, lambda: now_s), unattended=True)
+
+
+def test_the_levels_of_a_schedule_are_counted_where_there_are_such(tmp_path: Path) -> None:
+    counted: list[NodeCount] = []
+
+    async def go(station: Station) -> None:
+        for drone in station.fleet.drones.values():
+            for name in ("act", "plan_flight"):
+                note_counts(drone, name, counted)
         run = await station.look()
         assert run is not None
-        assert (run.state, run.cause) == (RunState.WAITING, "work")
-        assert "counts all levels" in run.why
+        assert run.levels == (1,)
+        await until(lambda: {*station.fleet.state["done"]} == AISLE, 300)
 
-    night(tmp_path, go, Kept("hall", "A", "a", CountAisles(("A",), (1,)), "22:00", "UTC"))
+    night(tmp_path, go, Kept("hall", "A", "a", CountAisles(("A",), (1,)), "22:00", "UTC"), counts=True)
+    assert {one.levels for one in counted} == {(1,)}
+    assert {one.node for one in counted} <= AISLE
+
+
+def note_counts(drone: PaperDrone, name: str, counted: list[NodeCount]) -> None:
+    """Note what it is told to count."""
+    told = getattr(drone, name)
+
+    async def noted(*of: Any, **how: Any) -> Any:
+        counted.extend(how.get("counts") or ())
+        return await told(*of, **how)
+
+    setattr(drone, name, noted)
 
 
 def test_a_kept_mission_knows_when_the_fleet_had_it_and_what_is_left(tmp_path: Path) -> None:
@@ -316,7 +447,11 @@ def test_what_is_worth_most_is_given_with_its_value_and_what_waits_or_is_closed_
         assert (run.state, run.cause) == (RunState.WAITING, "work")
         assert run.why == "all nodes wait already, or are closed"
 
-    night(tmp_path, go, Kept("hall", "Most valuable", "a", CountByValue(nodes=2), "22:00", "UTC"))
+    night(
+        tmp_path,
+        go,
+        Kept("hall", "Most valuable", "a", CountByValue(nodes=2), "22:00", "UTC", late_minutes=8640),
+    )
 
 
 @pytest.mark.parametrize("change", [datetime(2026, 3, 29, tzinfo=UTC), datetime(2026, 10, 25, tzinfo=UTC)])

@@ -25,6 +25,8 @@ from flightd.core.types import CommandKind, Phase
 from flightd.fleet.schedule.rolling import NodeCount, run_nodes
 from flightd.fleet.traffic.valued_work import PlaceFacts
 from flightd.ground.access.roles import Identity
+from flightd.ground.ground_store.open_store import opened_store
+from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.messages import Act
 from flightd.ground.missions.mission_book import Mission, MissionBook
 from flightd.ground.schedules.kept import CountAisles, CountAll, CountByValue, CountMission, Kept
@@ -150,8 +152,14 @@ class Station:
     """A night shift over a file, with a clock that a test sets."""
 
     def __init__(
-        self, folder: Path, kept: Kept = NIGHTLY, rest_s: float = 30.0, facts: Facts | None = None
+        self,
+        folder: Path,
+        kept: Kept = NIGHTLY,
+        rest_s: float = 30.0,
+        facts: Facts | None = None,
+        store: GroundStore | None = None,
     ) -> None:
+        self.store = store
         self.rest_s = rest_s
         self.facts = facts or Facts()
         self.folder = folder
@@ -169,10 +177,14 @@ class Station:
         del who, address, act, target
         self.lines.append((outcome["outcome"], outcome["text"]))
 
+    def keep(self, kept: Kept, schedule: str = "schedule-1") -> None:
+        """A schedule, as of now."""
+        self.book.keep(schedule, kept, self._ns())
+
     def reboot(self) -> None:
         clock = StationClock(self._ns, rest_s=self.rest_s)
         drones, missions = {"demo": self.drone}, MissionBook(self.folder)
-        self._shift = NightShift(self.book, missions, None, self.facts, drones, self, clock=clock)
+        self._shift = NightShift(self.book, missions, self.store, self.facts, drones, self, clock=clock)
 
     def at(self, text: str) -> Station:
         self.now = datetime.fromisoformat(f"2026-03-{text}").replace(tzinfo=UTC)
@@ -284,6 +296,71 @@ def test_in_quiet_hours_and_while_it_is_not_enabled_nothing_starts(tmp_path: Pat
     assert station.drone.starts == []
 
 
+def waiting(station: Station) -> None:
+    """Its run is due, and the drone is not ready."""
+    station.drone.status = msgspec.structs.replace(READY, obstacles=("low battery",))
+    run = station.at("01T22:00").look()
+    assert run is not None
+    assert run.state is RunState.WAITING
+    station.drone.status = READY
+    station.at("01T22:05")
+
+
+@pytest.mark.parametrize(
+    "change", [{"name": "Every night"}, {"late_minutes": 30}, {"count": CountAisles(("B",))}]
+)
+def test_a_run_that_waits_stays_due_where_its_schedule_is_mended(
+    station: Station, change: dict[str, Any]
+) -> None:
+    waiting(station)
+    station.keep(msgspec.structs.replace(NIGHTLY, **change))
+    run = station.look()
+    assert run is not None
+    assert (run.state, station.drone.starts) == (RunState.STARTED, [date(2026, 3, 1)])
+
+
+@pytest.mark.parametrize(
+    ("change", "why", "starts_later"),
+    [
+        ({"at": "22:30"}, "the schedule was changed", True),
+        ({"at": "21:30"}, "the schedule was changed", False),
+        ({"zone": "Europe/Berlin"}, "the schedule was changed", False),
+        ({"weekdays": (1,)}, "the schedule was changed", False),
+        ({"enabled": False}, "the schedule was suspended", False),
+    ],
+)
+def test_a_run_that_is_due_no_more_is_told_as_missed(
+    station: Station, change: dict[str, Any], why: str, starts_later: bool
+) -> None:
+    waiting(station)
+    station.keep(msgspec.structs.replace(NIGHTLY, **change))
+    for _ in range(2):
+        run = station.look()
+        assert run is not None
+        assert (run.state, run.cause, run.why) == (RunState.MISSED, "changed", why)
+    assert station.lines == [("missed", f"2026-03-01: {why}")]
+    if not msgspec.structs.replace(NIGHTLY, **change).enabled:
+        station.keep(NIGHTLY)
+    station.at("01T22:35").look()
+    assert bool(station.drone.starts) is starts_later
+
+
+def test_a_schedule_that_cannot_be_read_keeps_no_other_from_starting(
+    station: Station, caplog: pytest.LogCaptureFixture
+) -> None:
+    station.keep(msgspec.structs.replace(NIGHTLY, name="Damaged"), "schedule-2")
+    with sqlite3.connect(station.folder / FILE) as file:
+        file.execute("UPDATE schedule SET kept = '{}' WHERE id = 'schedule-2'")
+    run = station.at("01T22:00").look()
+    assert run is not None
+    assert run.state is RunState.STARTED
+    assert [one.name for one in station.book.schedules()[1]] == ["Damaged"]
+    (line,) = caplog.messages
+    assert line.startswith("schedule Damaged: cannot be read: Object missing required field")
+    station.keep(msgspec.structs.replace(NIGHTLY, name="Damaged"), "schedule-2")
+    assert station.book.schedules()[1] == []
+
+
 def test_a_file_that_cannot_be_written_starts_nothing(station: Station) -> None:
     (station.folder / FILE).write_bytes(b"not a database at all, whatever it is called")
     station.now = T0 + timedelta(hours=10)
@@ -350,6 +427,20 @@ def test_all_of_a_site_needs_the_ground_store(tmp_path: Path) -> None:
     run = Station(tmp_path, msgspec.structs.replace(NIGHTLY, count=CountAll(7))).at("01T22:00").look()
     assert run is not None
     assert (run.cause, run.why.partition(",")[0]) == ("work", "all of a site is counted by the ground store")
+
+
+def test_of_all_of_a_site_what_is_asked_for_and_contradicted_goes_first(tmp_path: Path) -> None:
+    facts = Facts(PlaceFacts("B6", 5.0, contradicted=True), PlaceFacts("A5", 5.0, asked=True))
+    with opened_store(str(tmp_path / "counts.db")) as store:
+        kept = msgspec.structs.replace(NIGHTLY, count=CountAll(7))
+        run = Station(tmp_path, kept, facts=facts, store=store).at("01T22:00").look()
+        assert run is not None
+        assert (run.why, run.nodes) == ("", ("A5", "B6", "A1", "A2"))
+        kept = msgspec.structs.replace(kept, name="Unread books")
+        (tmp_path / "other").mkdir()
+        other = Station(tmp_path / "other", kept, store=store).at("01T22:00").look()
+        assert other is not None
+        assert (other.state, other.nodes) == (RunState.STARTED, ("A1", "A2"))
 
 
 @pytest.mark.parametrize(
