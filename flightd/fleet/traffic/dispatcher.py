@@ -447,7 +447,7 @@ class Dispatcher:
         home, control = self.docks.home(drone), self.control
         times, budget_ms = self._times(control.drones[drone].place, home), self._budget_ms(drone)
         drones = [each for each, course in control.drones.items() if not course.failed]
-        for node in {*self.queue.open} - self._closed_to(drone):
+        for node in {*self.queue.ready} - self._closed_to(drone):
             work = self.queue.work(node)
             way_ms = times.out_ms(node) + work.dwell_ms + times.home_ms(node)
             if work.drone in {"", drone} and way_ms > budget_ms:

@@ -198,9 +198,9 @@ class WorkQueue:
             self._given[node] = drone
 
     def takes_ms(self, times: TourTimes) -> int:
-        """How long all that waits takes at least, the way out to each aisle with it."""
+        """How long all that may be begun now takes at least, the way out to each aisle with it."""
         aisles: dict[str, list[NodeWork]] = {}
-        for node in self._open:
+        for node in self.ready:
             aisles.setdefault(self._work[node].aisle, []).append(self._work[node])
         total_ms = 0
         for works in aisles.values():
