@@ -10,13 +10,12 @@ import urllib.request
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
-from urllib.parse import urlsplit
 
 import msgspec
 
-from flightd.config.ground import is_loopback
-from flightd.core.errors import FlightdError, InputError, UnavailableError
+from flightd.core.errors import FlightdError, UnavailableError
 from flightd.ground.ground_store.station_target import NoRedirect
+from flightd.ground.http_address import http_host
 
 MOST_ANSWER_BYTES = 32 << 20
 _MOST_REFUSAL_BYTES = 1 << 20
@@ -106,12 +105,7 @@ class JsonService:
 
 def checked_url(url: str, key: str) -> str:
     """InputError for what is no address of a service, or would send a key in the open."""
-    parts = urlsplit(url)
-    if parts.scheme not in {"http", "https"} or not parts.hostname or parts.path not in {"", "/"}:
-        raise InputError(f"{url} is no address of a service", key=key, remedy="give https://HOST:PORT")
-    if parts.scheme == "http" and not is_loopback(parts.hostname):
-        raise InputError("the key would be read on the way", key=key, remedy="give https://")
-    return url.rstrip("/")
+    return http_host(url, key, f"{url} is no address of a service")
 
 
 def _whole(answer: Any, before_s: float, most: int) -> bytes:

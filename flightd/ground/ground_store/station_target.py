@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import http.client
 import urllib.error
 import urllib.request
 from collections.abc import Sequence
 from typing import Any, TypeVar
-from urllib.parse import urlsplit
 
 import msgspec
 
-from flightd.config.ground import is_loopback
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.ground_store.batch import Batch, Receipt
+from flightd.ground.http_address import http_host, way_lost
 
 _WAIT_S = 30.0
 _MOST_ANSWER_BYTES = 1 << 20
@@ -26,18 +26,13 @@ class StationTarget:
 
     def __init__(self, url: str, key: str) -> None:
         """InputError for an address that would send the key in the open, and without a key."""
-        parts = urlsplit(url)
-        if parts.scheme not in {"http", "https"} or not parts.hostname or parts.path not in {"", "/"}:
-            raise InputError("not a station", key=f"--store {url}", remedy="give https://HOST:PORT")
-        if parts.scheme == "http" and not is_loopback(parts.hostname):
-            raise InputError("the key would be read on the way", key=f"--store {url}", remedy="give https://")
+        self.shown = http_host(url, f"--store {url}", "not a station")
         if not key:
             raise InputError(
                 "a station asks for a key",
                 key="FLIGHTD_STORE_KEY",
                 remedy="set it to one of: flightd ground keys make NAME --scope deliver",
             )
-        self.shown = url.rstrip("/")
         self._key = key
         self._opener = urllib.request.build_opener(urllib.request.ProxyHandler({}), NoRedirect())
 
@@ -66,9 +61,10 @@ class StationTarget:
             why = _refusal(err)
             refused = UnavailableError if err.code >= 500 else InputError
             raise refused(f"the station answers: {why}", file=self.shown) from None
-        except (OSError, msgspec.DecodeError) as err:
-            reason = getattr(err, "reason", None) or err
-            raise UnavailableError(f"the station cannot be had: {reason}", file=self.shown) from None
+        except (OSError, http.client.HTTPException) as err:
+            raise UnavailableError(f"the station cannot be had: {way_lost(err)}", file=self.shown) from None
+        except msgspec.DecodeError as err:
+            raise UnavailableError(f"the station cannot be had: {err}", file=self.shown) from None
 
 
 class NoRedirect(urllib.request.HTTPRedirectHandler):
@@ -81,5 +77,5 @@ class NoRedirect(urllib.request.HTTPRedirectHandler):
 def _refusal(err: urllib.error.HTTPError) -> str:
     try:
         return str(msgspec.json.decode(err.read(_MOST_ANSWER_BYTES), type=dict[str, Any])["refused"])
-    except (OSError, KeyError, msgspec.DecodeError):
+    except (OSError, http.client.HTTPException, KeyError, msgspec.DecodeError):
         return f"HTTP {err.code}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import hmac
+import http.client
 import json
 import logging
 import random
@@ -12,14 +13,13 @@ import time
 import urllib.error
 import urllib.request
 from typing import Any
-from urllib.parse import urlsplit
 
-from flightd.config.ground import is_loopback
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.utc_time import utc_text
 from flightd.ground.ground_store.events import Event
 from flightd.ground.ground_store.station_target import NoRedirect
 from flightd.ground.ground_store.store import GroundStore
+from flightd.ground.http_address import http_address, way_lost
 
 _LOG = logging.getLogger(__name__)
 SECRET = "FLIGHTD_WEBHOOK_SECRET"  # noqa: S105 - the name of a variable
@@ -35,11 +35,9 @@ class Webhook:
 
     def __init__(self, url: str, secret: str) -> None:
         """InputError for an address at which others would read it, and for a secret that is soon guessed."""
-        parts = urlsplit(url)
-        if parts.scheme not in {"http", "https"} or not parts.hostname:
-            raise InputError("not an address", key=f"--webhook {url}", remedy="give https://HOST/PATH")
-        if parts.scheme == "http" and not is_loopback(parts.hostname):
-            raise InputError("others could read it", key=f"--webhook {url}", remedy="give https://")
+        http_address(
+            url, f"--webhook {url}", "https://HOST/PATH", what="not an address", read="others could read it"
+        )
         if len(secret) < _LEAST_SECRET:
             raise InputError(
                 f"a webhook is signed with a secret of {_LEAST_SECRET} characters or more", key=SECRET
@@ -54,10 +52,11 @@ class Webhook:
         while True:
             try:
                 more = await asyncio.to_thread(self.tell, store)
-            except FlightdError as err:
-                if str(err) != failure:
-                    _LOG.warning("webhook %s: %s", self.url, err)
-                failure = str(err)
+            except Exception as err:  # noqa: BLE001 - its end would be the station's
+                told = str(err) if isinstance(err, FlightdError) else f"failed: {err!r}"
+                if told != failure:
+                    _LOG.warning("webhook %s: %s", self.url, told)
+                failure = told
                 await asyncio.sleep(delay_s * random.uniform(0.8, 1.2))
                 delay_s = min(2.0 * delay_s, _LONGEST_S)
                 continue
@@ -92,8 +91,8 @@ class Webhook:
                 pass
         except urllib.error.HTTPError as err:
             raise UnavailableError(f"answers HTTP {err.code}") from None
-        except OSError as err:
-            raise UnavailableError(f"cannot be had: {getattr(err, 'reason', None) or err}") from None
+        except (OSError, http.client.HTTPException) as err:
+            raise UnavailableError(f"cannot be had: {way_lost(err)}") from None
 
 
 def signature(secret: bytes, stamp: str, body: bytes) -> str:

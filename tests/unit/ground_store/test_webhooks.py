@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import hashlib
 import hmac
 import json
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,12 +21,15 @@ import pytest
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationState, Observation, Standing
 from flightd.core.types import CodeRead
-from flightd.ground.ground_store import events, migrations
+from flightd.ground.ground_store import events, migrations, webhooks
 from flightd.ground.ground_store.batch import Batch, SentDecision, SentLook
 from flightd.ground.ground_store.engine import Engine
 from flightd.ground.ground_store.evidence import FolderEvidence
+from flightd.ground.ground_store.open_store import opened_store
+from flightd.ground.ground_store.station_target import StationTarget
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.ground_store.webhooks import Webhook
+from tests.rigs.event_loops import in_real_time
 
 _SECRET = "a secret of the hall"
 _BEGIN = 1_760_000_000_000_000_000
@@ -125,12 +131,93 @@ def test_what_nobody_takes_is_bounded_and_counted(
     [
         ("http://wms.hall/hook", _SECRET, "others could read it; give https://"),
         ("wms.hall", _SECRET, "not an address"),
+        ("https://wms.hall:abc/hook", _SECRET, "not an address: Port could not be cast to integer value"),
+        ("https://wms.hall/our hook", _SECRET, "not an address: .*%XX there; give https://HOST/PATH"),
+        ("https://[wms.hall/hook", _SECRET, "not an address: Invalid IPv6 URL"),
+        ("https://wms..hall/hook", _SECRET, "not an address: its host is no name"),
+        ("https://ann:secret@wms.hall/hook", _SECRET, "no name and password belong into it"),
         ("https://wms.hall/hook", "short", "a secret of 16 characters or more"),
     ],
 )
 def test_a_hook_that_others_could_read_or_forge_is_refused(url: str, secret: str, why: str) -> None:
     with pytest.raises(InputError, match=why):
         Webhook(url, secret)
+
+
+@contextmanager
+def saying(answer: bytes) -> Iterator[int]:
+    """The port of something else than a web server."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve() -> None:
+            with contextlib.suppress(OSError):
+                while True:
+                    client, _ = listening.accept()
+                    with client:
+                        client.recv(65_536)
+                        client.sendall(answer)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        try:
+            yield listening.getsockname()[1]
+        finally:
+            listening.shutdown(socket.SHUT_RDWR)
+            thread.join()
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (b"SSH-2.0-OpenSSH_9.2\r\n", "it answers no HTTP"),
+        (b"HTTP/1.1 200 OK\r\n" + b"X: y\r\n" * 200, "it answers no HTTP"),
+        (b"", "Remote end closed connection|reset by peer"),
+    ],
+)
+def test_what_answers_no_http_is_one_line(tmp_path: Path, answer: bytes, why: str) -> None:
+    with saying(answer) as port, opened_store(str(tmp_path / "store.db")) as store:
+        hook = Webhook(f"http://127.0.0.1:{port}/hook", _SECRET)
+        hook.tell(store)
+        store.take(counted(1))
+        with pytest.raises(UnavailableError, match=why):
+            hook.tell(store)
+        with pytest.raises(UnavailableError, match=why):
+            StationTarget(f"http://127.0.0.1:{port}", "key").take(counted(1))
+
+
+def test_an_answer_that_breaks_off_is_one_line(tmp_path: Path) -> None:
+    with saying(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n99\r\n{") as port:
+        station = StationTarget(f"http://127.0.0.1:{port}/", "key")
+        with pytest.raises(UnavailableError, match=f":{port}: the station cannot be had: .*broke off"):
+            station.standings([])
+    with pytest.raises(InputError, match="--store https://hall:abc: not a station: Port could not be cast"):
+        StationTarget("https://hall:abc", "key")
+
+
+@in_real_time
+async def test_no_failure_of_a_hook_ends_the_station(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(webhooks, "_FIRST_S", 0.001)
+    hook, asked = Webhook("http://127.0.0.1:9/hook", _SECRET), asyncio.Event()
+    loop = asyncio.get_running_loop()
+    failures: list[Exception] = [OverflowError("too large"), OverflowError("too large"), ValueError("odd")]
+
+    def tell(_: GroundStore) -> bool:
+        if failures:
+            raise failures.pop(0)
+        loop.call_soon_threadsafe(asked.set)
+        return False
+
+    monkeypatch.setattr(hook, "tell", tell)
+    with opened_store(str(tmp_path / "store.db")) as store:
+        running, heard = asyncio.create_task(hook.run(store)), asyncio.create_task(asked.wait())
+        done, _ = await asyncio.wait({running, heard}, return_when=asyncio.FIRST_COMPLETED)
+        assert done == {heard}
+        running.cancel()
+        await asyncio.wait({running})
+    told = [record.getMessage().partition("hook: ")[2] for record in caplog.records]
+    assert told == ["failed: OverflowError('too large')", "failed: ValueError('odd')"]
 
 
 def test_a_store_from_before_webhooks_is_brought_up_to_date(
