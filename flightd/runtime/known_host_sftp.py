@@ -12,7 +12,7 @@ _WAIT_S = 20.0
 
 class KnownHostSftp(SFTPFileSystem):  # type: ignore[misc]
     """Known are the hosts of `~/.ssh/known_hosts`; keys are those of an agent and of `~/.ssh`.  SSHException,
-    OSError."""
+    OSError.  For one thread at a time: paramiko's client drops what is answered to another one."""
 
     client: Any
     ftp: Any
@@ -30,3 +30,15 @@ class KnownHostSftp(SFTPFileSystem):  # type: ignore[misc]
         except BaseException:
             self.client.close()
             raise
+
+    def is_lost(self, err: Exception) -> bool:
+        """Whether it is the connection that failed: no answer fits a question on it any more."""
+        if isinstance(err, paramiko.SSHException | EOFError | TimeoutError):
+            return True
+        transport = self.client.get_transport()
+        return transport is None or not transport.is_active() or self.ftp.get_channel().closed
+
+    def reopen(self) -> None:
+        """A new connection."""
+        self.client.close()
+        self._connect()

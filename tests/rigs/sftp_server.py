@@ -69,11 +69,18 @@ class _Door(paramiko.ServerInterface):  # type: ignore[misc]
         return int(paramiko.OPEN_SUCCEEDED)
 
 
+def drop(connections: list[Any]) -> None:
+    """As a server does that is started anew."""
+    for transport in connections:
+        transport.close()
+    connections.clear()
+
+
 @contextmanager
-def sftp_server(known_hosts: Path) -> Iterator[int]:
-    """Its port; its key is written to `known_hosts`."""
+def sftp_server(known_hosts: Path, transports: list[Any] | None = None) -> Iterator[int]:
+    """Its port; its key is written to `known_hosts`, its connections are noted in `transports`."""
     key = paramiko.ECDSAKey.generate()
-    transports: list[Any] = []
+    transports = [] if transports is None else transports
     with socket.create_server(("127.0.0.1", 0)) as listening:
         port = listening.getsockname()[1]
         known = paramiko.HostKeys()
@@ -99,5 +106,4 @@ def sftp_server(known_hosts: Path) -> Iterator[int]:
         finally:
             listening.shutdown(socket.SHUT_RDWR)
             thread.join()
-            for transport in transports:
-                transport.close()
+            drop(transports)

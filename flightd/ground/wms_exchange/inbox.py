@@ -68,6 +68,7 @@ class Inbox:
     def take(self, sleep: Callable[[float], None]) -> Iterator[TakenFile]:
         """What was begun before, then what is new, oldest first; what is written still stays."""
         for name in sorted(self._listed(_TAKING)):
+            self._folder.end_move(name, f"{_TAKING}/{name}")
             yield self._finish(name)
         self._taker.moved(self._id)
         before = self._listed()

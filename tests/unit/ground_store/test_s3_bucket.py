@@ -15,6 +15,7 @@ from flightd.ground.ground_store.open_store import opened_store
 from flightd.ground.shared_folder import SharedFolder
 from tests.rigs.drop_folders import check_files_come_and_go
 from tests.rigs.extras import of_extra
+from tests.rigs.wms_exchange import EXPECTED, kept, once
 
 of_extra("s3fs", "s3")
 
@@ -57,6 +58,20 @@ def test_files_of_a_drop_folder_come_and_go(bucket: str, files: Any) -> None:
     check_files_come_and_go(there, lambda data: files.pipe_file("hall-3/drop/a.csv", data), 100, b"b" * 100)
     assert files.find("hall-3/drop") == ["hall-3/drop/done/a.csv.txt", "hall-3/drop/taking/a.csv"]
     assert files.cat_file("hall-3/drop/done/a.csv.txt") == b"then"
+
+
+def test_a_drop_that_was_claimed_by_half_is_taken_once(bucket: str, files: Any, place: Path) -> None:
+    stock, claimed = "hall-3/in/stock.csv", "hall-3/in/taking/stock.csv"
+    text = EXPECTED.replace('inbox = "in"', f'inbox = "{bucket}/in"')
+    files.pipe_file(stock, b"LGPLA;NVE;MENGE\nA-1;PAL-1;1\n")
+    files.cp_file(stock, claimed)  # a bucket renames by copying, and then it was cut
+    assert [file.said for file in once(place, text).files] == ["1 rows"]
+    assert once(place, text).files == []
+    files.pipe_file(claimed, b"LGPLA;NVE;MENGE\nA-1;PAL-3;1\n")
+    files.pipe_file(stock, b"LGPLA;NVE;MENGE\nA-1;PAL-4;1\n")  # dropped while another one is claimed
+    assert len(once(place, text).files) == 2
+    assert b"PAL-4" in kept(place)[1]
+    assert len(files.find("hall-3/in")) == 2 * 3
 
 
 def test_no_bucket_is_made(bucket: str, files: Any, tmp_path: Path) -> None:

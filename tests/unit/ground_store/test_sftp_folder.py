@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,7 +22,13 @@ of_extra("paramiko", "exchange")
 
 
 @pytest.fixture
-def host(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+def connections() -> list[Any]:
+    """Those that the host has at the moment."""
+    return []
+
+
+@pytest.fixture
+def host(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, connections: list[Any]) -> Iterator[str]:
     """A URL of it, without a folder; this machine knows its key, and the password."""
     from tests.rigs import sftp_server
 
@@ -28,7 +36,7 @@ def host(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     known.parent.mkdir()
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv(PASSWORD, sftp_server.PASSWORD)
-    with sftp_server.sftp_server(known) as port:
+    with sftp_server.sftp_server(known, connections) as port:
         yield f"sftp://ann@127.0.0.1:{port}"
 
 
@@ -74,6 +82,45 @@ def test_pictures_of_a_store_lie_on_another_machine(host: str, tmp_path: Path) -
         file.write_bytes(jpeg[:4])  # as another program may leave it
         with pytest.raises(UnavailableError, match=f"/{name}.jpg: the picture is damaged"):
             store.evidence.picture(name)
+
+
+def test_a_server_that_was_started_anew_costs_no_picture(
+    host: str, tmp_path: Path, connections: list[Any]
+) -> None:
+    from tests.rigs.sftp_server import drop
+
+    with opened_store(str(tmp_path / "counts.db"), f"{host}{tmp_path}/pictures") as store:
+        names = [store.evidence.keep(b"\xff\xd8 first")]
+        drop(connections)
+        names.append(store.evidence.keep(b"\xff\xd8 second"))
+        drop(connections)
+        assert store.evidence.picture(names[0]) == b"\xff\xd8 first"
+        drop(connections)
+        assert store.missing_pictures([*names, "0" * 64]) == {"0" * 64}
+        assert len(connections) == 1
+
+
+def test_a_server_that_stays_away_is_one_line(host: str, tmp_path: Path, connections: list[Any]) -> None:
+    from tests.rigs.sftp_server import drop
+
+    there = folder(f"{host}{tmp_path}")
+    (tmp_path / ".ssh" / "known_hosts").write_text("")  # as if it were another one now
+    drop(connections)
+    for _ in range(2):
+        with pytest.raises(UnavailableError, match=r"looked for: .*not found in known_hosts"):
+            there.has("a.csv")
+
+
+def test_many_ask_for_pictures_at_once(host: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from flightd.ground import known_host_sftp
+
+    monkeypatch.setattr(known_host_sftp, "_WAIT_S", 2.0)
+    with opened_store(str(tmp_path / "counts.db"), f"{host}{tmp_path}/pictures") as store:
+        names = [store.evidence.keep(b"\xff\xd8%d" % number) for number in range(20)]
+        with ThreadPoolExecutor(8) as threads:
+            for _ in range(5):
+                pictures = list(threads.map(store.evidence.picture, names))
+                assert pictures == [b"\xff\xd8%d" % number for number in range(20)]
 
 
 def test_a_place_for_pictures_that_cannot_be_had_is_one_line(tmp_path: Path) -> None:
