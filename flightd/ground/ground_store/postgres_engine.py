@@ -20,6 +20,13 @@ _WRITER = 0x666C7473
 _CONNECTIONS = 4
 _WAIT_S = 10.0
 _CONNECT_S = 5
+_READ_S = 60
+"""At most for one question; any page takes parts of a second."""
+_HOST_GONE = {
+    "keepalives": 1, "keepalives_idle": 10, "keepalives_interval": 5, "keepalives_count": 3,
+    "tcp_user_timeout": 15_000,
+}  # fmt: skip
+"""A host that is gone without a word is noticed in 25 s (libpq's options in s, the last in ms)."""
 _FIRST_YEAR, _LAST_YEAR = 2020, 2100
 _NS = 1_000_000_000
 _OPTIONS = f"-c search_path={_SCHEMA} -c client_min_messages=warning"
@@ -65,8 +72,10 @@ class PostgresEngine:
         )
 
     def _connected(self) -> psycopg.Connection[Row]:
+        asked = conninfo_to_dict(self._url)
         given: dict[str, Any] = {"connect_timeout": _CONNECT_S, "application_name": "flightd"}
-        given["options"] = f"{conninfo_to_dict(self._url).get('options') or ''} {_OPTIONS}".strip()
+        given |= {name: value for name, value in _HOST_GONE.items() if name not in asked}
+        given["options"] = f"{asked.get('options') or ''} {_OPTIONS}".strip()
         return psycopg.connect(self._url, autocommit=True, **given)
 
     @contextmanager
@@ -77,7 +86,8 @@ class PostgresEngine:
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        with self._session("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY") as session:
+        begin = "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"
+        with self._session(f"{begin}; SET LOCAL statement_timeout = '{_READ_S}s'") as session:
             yield session
 
     @contextmanager
