@@ -31,6 +31,8 @@ _BEFORE = (
     f"SELECT {_COLUMNS} FROM observation WHERE place = ? AND utc_ns <= ? AND (utc_ns, id) < (?, ?)"
     f" AND run <> ? AND {_CONFIRMED} AND {_COUNTED} {_NEWEST_FIRST}"
 )
+_NO_RUN = 0
+"""Ids begin with 1."""
 _NEWEST = f"SELECT {_COLUMNS} FROM observation WHERE place = ? AND {_CONFIRMED} {_NEWEST_FIRST}"
 _STANDS = (
     "UPDATE place SET utc_ns = ?, look = ?, run = ?, state = ?, texts = ?, confidence = ?, evidence = ?,"
@@ -183,13 +185,30 @@ def _renew_place(session: Session, place: Touched, written: _Written) -> None:
     """From the looks themselves: every run that has one since the first that has changed."""
     since = [Moment(*row) for row in session.rows(_SINCE, place.place, place.first_ns)]
     latest = {look.run: look for look in since}  # the last of each run stays
+    befores = _befores(session, place, since) if since else {}
     for run in sorted(place.runs | set(latest)):
-        now = latest.get(run) or _one(session, _OF_RUN, place.place, run)
-        before = None
+        now, before = latest.get(run), None
         if now is not None:
+            before = befores[now.id]
+        elif now := _one(session, _OF_RUN, place.place, run):
             before = _one(session, _BEFORE, place.place, now.utc_ns, *now.order, run)
         written.differ(place.code, run, now, before)
     written.stand(place.place, since[-1] if since else _one(session, _NEWEST, place.place))
+
+
+def _befores(session: Session, place: Touched, since: Sequence[Moment]) -> dict[bytes, Moment | None]:
+    """What counted before each of the looks, of another run: by memory, since they may be many."""
+    begin = place.place, place.first_ns, place.first_ns, b""
+    last = _one(session, _BEFORE, *begin, _NO_RUN)
+    other = None if last is None else _one(session, _BEFORE, *begin, last.run)
+    befores: dict[bytes, Moment | None] = {}
+    for look in since:
+        befores[look.id] = other if last is not None and last.run == look.run else last
+        if look.is_counted:
+            if last is not None and last.run != look.run:
+                other = last
+            last = look
+    return befores
 
 
 def _one(session: Session, question: str, *values: object) -> Moment | None:

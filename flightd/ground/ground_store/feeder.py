@@ -102,7 +102,7 @@ class Feeder:
 
     def _inventories(self) -> Iterator[_Part]:
         book = None if self._folder is None else DecisionBook(self._folder)
-        for name, written_ns in self._stores.names():
+        for name, written_ns in reversed(self._stores.names()):  # what follows on is soonest taken
             site = self._stores.site_name(name)
             decisions = [] if book is None else book.decisions(name)
             if site:  # else no flight log says yet where it was counted
