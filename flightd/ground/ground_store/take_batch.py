@@ -14,11 +14,30 @@ from flightd.ground.ground_store.fill_text import fill_text
 from flightd.ground.ground_store.reads_text import reads_text, undecided_text
 
 _LOOK = f"INSERT INTO observation VALUES ({', '.join('?' * 16)}) ON CONFLICT DO NOTHING"
-_TOLD = ("duration_s", "mission", "outcome", "reason", "verdict", "nodes_planned", "nodes_visited")
-"""Of a flight, when its log ended or was judged since."""
+_TOLD = {
+    "mission": "''", "outcome": "''", "verdict": "''",
+    "duration_s": "NULL", "nodes_planned": "NULL", "nodes_visited": "NULL",
+}  # fmt: skip
+"""Each with what stands where it is not known."""
+_ENDED = "('completed', 'aborted', 'taken over')"
+_IS_OLDER = f"flight.outcome IN {_ENDED} AND excluded.outcome NOT IN {_ENDED}"
+"""A copy of the log from before its end."""
+
+
+def _told(name: str, blank: str) -> str:
+    """A column of a flight whose log ended or was judged since: what is not known of it any more stays."""
+    new, known = (f"nullif({of}.{name}, {blank})" for of in ("excluded", "flight"))
+    return (
+        f"{name} = CASE WHEN {_IS_OLDER} THEN coalesce({known}, {new}, {blank})"
+        f" ELSE coalesce({new}, {known}, {blank}) END"
+    )
+
+
 _FLIGHT = (
-    f"INSERT INTO flight VALUES ({', '.join('?' * 11)}) ON CONFLICT (id)"
-    f" DO UPDATE SET {', '.join(f'{name} = excluded.{name}' for name in _TOLD)}"
+    f"INSERT INTO flight VALUES ({', '.join('?' * 11)}) ON CONFLICT (id) DO UPDATE SET"
+    f" {', '.join(_told(name, blank) for name, blank in _TOLD.items())},"
+    f" reason = CASE WHEN {_IS_OLDER} OR excluded.reason = '' AND excluded.outcome = flight.outcome"
+    " THEN flight.reason ELSE excluded.reason END"
 )
 _DECISION = "INSERT INTO decision VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING"
 _AUDIT = "INSERT INTO audit VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING"
