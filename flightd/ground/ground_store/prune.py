@@ -13,7 +13,7 @@ from pathlib import Path
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.inventory import Observation, Standing
 from flightd.ground.ground_store.batch import MOST_LOOKS
-from flightd.ground.ground_store.sender import Target
+from flightd.ground.ground_store.sender import Target, missing_pictures
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +47,8 @@ def _had(
 ) -> list[Observation]:
     """Those that the store has, for good, with the pictures that are here."""
     kept = target.standings([seen.id for seen, _ in part])
-    names = sorted({seen.evidence for seen, _ in part if seen.evidence})
-    missing = {name for name in target.missing_pictures(names) if inventory.evidence.path(name).exists()}
+    names = {seen.evidence for seen, _ in part if seen.evidence}
+    missing = {name for name in missing_pictures(names, target) if inventory.evidence.path(name).exists()}
     return [
         seen
         for seen, how in part

@@ -5,7 +5,7 @@ has, so a delivery that was cut anywhere goes on where it was, from read-only me
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -27,6 +27,8 @@ from flightd.ground.ground_store.batch import (
 
 _BEGINNING = 1 << 16
 """Bytes of a log by which its flight is known: time, drone, map and configuration stand there."""
+_ASKED_AT_ONCE = 50
+"""Pictures."""
 _NS = 1_000_000_000
 _T = TypeVar("_T")
 
@@ -92,14 +94,22 @@ def deliver_inventory(folder: Path, site: str, source: str, target: Target, done
 
 def _keep_pictures(inventory: SqliteStore, looks: Sequence[Observation], target: Target) -> int:
     """Before the looks that name them; a picture that the sender has no longer is not waited for."""
-    names = sorted({seen.evidence for seen in looks if seen.evidence})
+    names = {seen.evidence for seen in looks if seen.evidence}
     sent = 0
-    for name in sorted(target.missing_pictures(names)):
+    for name in missing_pictures(names, target):
         path = inventory.evidence.path(name)
         if path.is_file():
             target.keep_picture(path.read_bytes())
             sent += 1
     return sent
+
+
+def missing_pictures(names: Iterable[str], target: Target) -> Iterator[str]:
+    """Those that the target has not.  It is asked of few at once: it may look for each in turn where a way
+    there and back is long, within the time that an answer may take."""
+    asked = sorted(names)
+    for begin in range(0, len(asked), _ASKED_AT_ONCE):
+        yield from sorted(target.missing_pictures(asked[begin : begin + _ASKED_AT_ONCE]))
 
 
 def deliver_flights(

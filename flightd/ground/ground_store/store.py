@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -22,6 +23,9 @@ from flightd.ground.ground_store.pages import MOST_ROWS, Mark
 from flightd.ground.ground_store.parquet import export
 from flightd.ground.ground_store.questions import Question
 from flightd.ground.ground_store.take_batch import Taken, take_batch
+
+_LOOKED_FOR_AT_ONCE = 16
+"""Pictures."""
 
 
 class GroundStore:
@@ -86,7 +90,9 @@ class GroundStore:
 
     def missing_pictures(self, names: Sequence[str]) -> set[str]:
         """Those that the store has not.  InputError for what names no picture."""
-        return {name for name in names if not self.evidence.has(name)}
+        with ThreadPoolExecutor(_LOOKED_FOR_AT_ONCE) as threads:  # a bucket is far away
+            found = threads.map(self.evidence.has, names)
+            return {name for name, is_there in zip(names, found, strict=True) if not is_there}
 
     def keep_picture(self, jpeg: bytes) -> str:
         """Keep a picture, through to the disk; its name."""
