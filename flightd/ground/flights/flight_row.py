@@ -18,7 +18,8 @@ from flightd.ground.flights.log_folder import FoundLog, beside, path_of
 from flightd.replay.log_skim import SkimmedLog, skim
 
 _RUNNING_S = 10.0
-"""A log is written out once a second: one that is not closed and was not touched for so long is broken."""
+"""A log is written out once a second: one that is not closed and was not touched for so long is broken, as is
+one that a clock far ahead dates into the future."""
 _MOST_SUMMARY_BYTES = 1 << 20
 _NAMED_NODES = 6
 _STARTED = "%Y-%m-%d %H:%M:%S UTC"
@@ -78,7 +79,7 @@ def _row(log: FoundLog) -> FlightRow:
     except OSError as err:
         return msgspec.structs.replace(blank, trouble=f"cannot be read: {err.strerror}")
     summary, trouble = _summary(path)
-    running = not skimmed.whole and time.time() - log.mtime_ns * 1e-9 < _RUNNING_S
+    running = not skimmed.whole and abs(time.time() - log.mtime_ns * 1e-9) < _RUNNING_S
     if not skimmed.whole:
         cut = "is being recorded" if running else "cut off before its end: a kill, or a loss of power"
         trouble = "; ".join(filter(None, (cut, trouble)))

@@ -11,6 +11,10 @@ from flightd.core.inventory import Observation, PlannedLocation, Standing
 
 MOST_LOOKS = 500
 """In one batch."""
+_MOST_NAME_CHARS = 300
+"""Of what is looked up by an index: PostgreSQL refuses entries of more than 2,704 bytes."""
+_MOST = 1 << 63
+"""Whole numbers are below it, as both databases keep them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +91,6 @@ class Batch:
     decisions: tuple[SentDecision, ...] = ()
     people: tuple[SentPerson, ...] = ()
     audit: tuple[SentLine, ...] = ()
-
     @property
     def id(self) -> bytes:
         """The same for the same content, whoever sends it."""
@@ -99,33 +102,68 @@ class Batch:
         return digest.digest()
 
     def check(self) -> None:
-        """InputError for what no database keeps: names with NUL or half a character in them, looks without a
-        site, and too much at once."""
+        """InputError for what no database keeps: texts with NUL or half a character in them, names too long
+        for an index, numbers and ids that are none, looks without a site, and too much at once."""
         if len(self.looks) > MOST_LOOKS:
             raise InputError(f"a batch of {len(self.looks)} looks", remedy=f"send at most {MOST_LOOKS}")
         if not self.site and (self.places or self.looks or self.flights or self.decisions):
             raise InputError("of no site", file=self.source, remedy="say which: --site NAME")
         for look in self.looks:
-            if not 0 <= look.observation.utc_ns < 1 << 63:
+            if not 0 <= look.observation.utc_ns < _MOST:
                 raise InputError(f"{look.observation.location}: a look at no time", file=self.source)
-        for text in self._texts():
+        for name in self._names():
+            if len(name) > _MOST_NAME_CHARS:
+                raise InputError(f"{name[:40]}…: a name of {len(name)} characters", file=self.source,
+                                 remedy=f"give at most {_MOST_NAME_CHARS}")  # fmt: skip
+        for text in (*self._names(), *self._texts()):
             if "\0" in text or not _is_text(text):
-                raise InputError(f"the name {text!r} is no text", file=self.source)
+                raise InputError(f"the name {text[:200]!r} is no text", file=self.source)
+        for what, digest in self._digests():
+            if not is_sha256(digest):
+                raise InputError(f"{what} {digest[:80]!r} is no SHA-256 in hexadecimal", file=self.source)
+        for what, number in self._numbers():
+            if number is not None and not 0 <= number < _MOST:
+                raise InputError(f"{what} is out of range", file=self.source)
+
+    def _names(self) -> Iterator[str]:
+        """What stands in an index."""
+        yield from (self.site, self.source)
+        yield from (place.code for place in self.places)
+        for look in self.looks:
+            yield from (look.observation.run, look.observation.location)
+        for decision in self.decisions:
+            yield from (decision.id, decision.place)
+        yield from (person.name for person in self.people)
 
     def _texts(self) -> Iterator[str]:
-        yield self.site
-        yield self.source
-        for place in self.places:
-            yield from (place.code, place.node)
-        for look in self.looks:
-            pose = look.observation.pose
-            yield from (look.observation.run, look.observation.location, pose.node if pose else "")
+        yield from (place.node for place in self.places)
+        yield from (look.observation.pose.node for look in self.looks if look.observation.pose)
         for flight in self.flights:
             yield from (flight.drone, flight.mission, flight.outcome, flight.reason, flight.verdict)
         for decision in self.decisions:
-            yield from (decision.id, decision.place, decision.who, decision.note)
+            yield from (decision.what, decision.who, decision.note)
+        yield from (person.role for person in self.people)
         for line in self.audit:
             yield from (line.person, line.act, line.target, line.outcome, line.line)
+
+    def _digests(self) -> Iterator[tuple[str, str]]:
+        yield from (("the flight", flight.id) for flight in self.flights)
+        yield from (
+            ("the picture", look.observation.evidence) for look in self.looks if look.observation.evidence
+        )
+
+    def _numbers(self) -> Iterator[tuple[str, float | None]]:
+        for flight in self.flights:
+            yield from (("began_ns", flight.began_ns), ("duration_s", flight.duration_s))
+            yield from (("nodes_planned", flight.nodes_planned), ("nodes_visited", flight.nodes_visited))
+        for decision in self.decisions:
+            yield from (
+                ("utc_ns of a decision", decision.utc_ns),
+                ("seen_ns of a decision", decision.seen_ns),
+            )
+        yield from (("seen_ns of a person", person.seen_ns) for person in self.people)
+        yield from (("utc_ns of an audit line", line.utc_ns) for line in self.audit)
+        yield from (("pallets_deep", place.pallets_deep << 32) for place in self.places)  # 32 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,3 +184,8 @@ def _is_text(text: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
+
+
+def is_sha256(text: str) -> bool:
+    """In hexadecimal."""
+    return len(text) == 64 and set(text) <= set("0123456789abcdef")

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from flightd.adapters.store.evidence_pictures import EvidenceFolder, evidence_file, evidence_name
 from flightd.core.errors import InputError, UnavailableError
+from flightd.ground.ground_store.batch import is_sha256
 from flightd.ground.plain_files import plain_file
 from flightd.ground.shared_folder import SharedFolder
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, picture_name
@@ -96,6 +97,6 @@ def _untold(what: str) -> InputError:
 
 def checked(name: str) -> str:
     """The name of a picture.  InputError for another."""
-    if len(name) != 64 or not set(name) <= set("0123456789abcdef"):
+    if not is_sha256(name):
         raise InputError("not the name of a picture")
     return name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import logging
 import platform
 import threading
@@ -29,6 +30,7 @@ from flightd.ground.ground_store.sender import (
     deliver_decisions,
     deliver_flights,
     deliver_inventory,
+    stored_ns,
 )
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.read_folders import ReadFolder
@@ -36,21 +38,21 @@ from flightd.ground.stores import Stores
 
 _LOG = logging.getLogger(__name__)
 _EACH_S = 10.0
-_NS = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Something that is delivered again whenever its `stamp` is another."""
+    """Something that is delivered again whenever its `stamp` is another, or `deliver` said that it was not
+    all yet."""
 
     name: str
     stamp: object
-    deliver: Callable[[], None]
+    deliver: Callable[[], bool]
 
 
 class Feeder:
     """Delivers to `store` what lies under `folder` and the `others`, and of the station's `state` people and
-    audit.  What cannot be delivered is said once, and tried again when it has changed."""
+    audit.  What cannot be delivered is said once, and tried again and again."""
 
     def __init__(
         self, store: GroundStore, folder: Path | None, others: Sequence[ReadFolder], state: Path
@@ -63,8 +65,9 @@ class Feeder:
         self._source = platform.node()
         self._done: dict[str, object] = {}
         self._failures: dict[str, str] = {}
-        self._read: dict[int, int] = {}
-        """By inode how much of the audit was delivered since the station began; again is harmless."""
+        self._read: dict[bytes, int] = {}
+        """How much was delivered of each file of the audit since the station began, by the SHA-256 of its
+        first line: an inode goes with a file that is put aside, and to another later.  Again is harmless."""
         self._turn = threading.Lock()
         self._ending = False
 
@@ -85,18 +88,19 @@ class Feeder:
                     for part in kind():
                         if not self._ending and self._done.get(part.name) != part.stamp:
                             with self._failure_told(part.name):
-                                part.deliver()
-                                self._done[part.name] = part.stamp
+                                if part.deliver():
+                                    self._done[part.name] = part.stamp
 
     @contextmanager
     def _failure_told(self, what: str) -> Iterator[None]:
         """In the log, once for each that is another."""
         try:
             yield
-        except (FlightdError, OSError) as err:
-            if self._failures.get(what) != str(err):
-                _LOG.warning("%s: not in the ground store: %s", what, err)
-            self._failures[what] = str(err)
+        except Exception as err:  # noqa: BLE001 - its end would be the station's
+            why = str(err) if isinstance(err, FlightdError | OSError) else f"failed: {err!r}"
+            if self._failures.get(what) != why:
+                _LOG.warning("%s: not in the ground store: %s", what, why)
+            self._failures[what] = why
         else:
             self._failures.pop(what, None)
 
@@ -109,10 +113,11 @@ class Feeder:
                 deliver = partial(self._deliver_inventory, name, site, decisions)
                 yield _Part(f"inventory {name}", (written_ns, len(decisions), site), deliver)
 
-    def _deliver_inventory(self, name: str, site: str, decisions: Sequence[Decision]) -> None:
+    def _deliver_inventory(self, name: str, site: str, decisions: Sequence[Decision]) -> bool:
         done = Delivered()
         deliver_inventory(self._stores.folder(name), site, self._source, self._store, done)
         deliver_decisions(decisions, site, self._source, self._store, done)
+        return True
 
     def _flights(self) -> Iterator[_Part]:
         if self._folder is not None:
@@ -123,9 +128,10 @@ class Feeder:
     def _people(self) -> Iterator[_Part]:
         people = PeopleBook(self._state).people()
 
-        def deliver() -> None:
+        def deliver() -> bool:
             sent = tuple(SentPerson(person.name, person.role.value, time.time_ns()) for person in people)
             self._store.take(Batch("", self._source, people=sent))
+            return True
 
         yield _Part("people", tuple((person.name, person.role) for person in people), deliver)
 
@@ -135,19 +141,20 @@ class Feeder:
                 stamp = file.stat()
             except FileNotFoundError:
                 continue
-            deliver = partial(self._deliver_audit, file, stamp.st_ino)
-            yield _Part(f"audit {file.name}", (stamp.st_ino, stamp.st_size), deliver)
+            mark = stamp.st_ino, stamp.st_size, stamp.st_mtime_ns
+            yield _Part(f"audit {file.name}", mark, partial(self._deliver_audit, file))
 
-    def _deliver_audit(self, file: Path, inode: int) -> None:
-        """What was added since it was delivered last, in whole lines; a file keeps its inode when it is put
-        aside."""
+    def _deliver_audit(self, file: Path) -> bool:
+        """What was added since it was delivered last, in whole lines."""
         with file.open("rb") as lines:
-            lines.seek(self._read.get(inode, 0))
+            first = hashlib.sha256(lines.readline()).digest()
+            lines.seek(self._read.get(first, 0))
             while part := list(islice(lines, MOST_LOOKS)):
                 whole = [line for line in part if line.endswith(b"\n")]
                 sent = [_sent_line(line.decode(errors="replace").rstrip("\n")) for line in whole]
                 self._store.take(Batch("", self._source, audit=tuple(sent)))
-                self._read[inode] = self._read.get(inode, 0) + sum(map(len, whole))
+                self._read[first] = self._read.get(first, 0) + sum(map(len, whole))
+        return True
 
 
 def _sent_line(line: str) -> SentLine:
@@ -160,8 +167,8 @@ def _sent_line(line: str) -> SentLine:
         return str(entry.get(name, "")).replace("\0", "\N{REPLACEMENT CHARACTER}")
 
     try:
-        utc_ns = max(round(datetime.fromisoformat(field("time")).timestamp() * _NS), 0)
-    except ValueError:
+        utc_ns = stored_ns(datetime.fromisoformat(field("time")).timestamp())
+    except (ValueError, OverflowError):
         utc_ns = 0
     return SentLine(
         utc_ns, field("person"), field("act"), field("target"), field("outcome"), line.replace("\0", "")

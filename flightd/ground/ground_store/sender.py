@@ -114,25 +114,34 @@ def missing_pictures(names: Iterable[str], target: Target) -> Iterator[str]:
 
 def deliver_flights(
     logs: Sequence[FoundLog], site: str, source: str, target: Target, done: Delivered
-) -> None:
-    """Every flight that is over; each is of its own log's site, else of `site`."""
+) -> bool:
+    """Every flight that is over; each is of its own log's site, else of `site`.  Whether all are: one whose
+    log was written just now may be cut off there, and that log never changes again."""
     by_site: dict[str, list[SentFlight]] = {}
+    all_over = True
     for log, row in zip(logs, read_rows(tuple(logs)), strict=True):
+        all_over &= not row.running
         if row.outcome and not row.running and (row.site or site):
             by_site.setdefault(row.site or site, []).append(_flight(log, row))
     for name, flights in by_site.items():
         for part in _parts(flights):
             target.take(Batch(name, source, flights=tuple(part)))
             done.flights += len(part)
+    return all_over
 
 
 def _flight(log: FoundLog, row: FlightRow) -> SentFlight:
     with path_of(log.root, log.relative).open("rb") as stream:
         beginning = stream.read(_BEGINNING)
     return SentFlight(
-        hashlib.sha256(beginning).hexdigest(), row.drone, round(row.started_s * _NS), row.duration_s,
+        hashlib.sha256(beginning).hexdigest(), row.drone, stored_ns(row.started_s), row.duration_s,
         row.mission, row.outcome, row.reason, row.verdict, row.nodes_planned, row.nodes_visited,
     )  # fmt: skip
+
+
+def stored_ns(utc_s: float) -> int:
+    """A point in time that a store keeps, whatever a clock said."""
+    return min(max(round(utc_s * _NS), 0), (1 << 63) - 1)
 
 
 def deliver_decisions(
