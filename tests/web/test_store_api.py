@@ -17,6 +17,7 @@ import msgspec
 import pytest
 
 from flightd.adapters.ground_link.client import Address
+from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationState, PlaceFill, Standing, UndecidedCode
 from flightd.ground.access import access
 from flightd.ground.access.key_book import KeyBook, Scope
@@ -24,7 +25,9 @@ from flightd.ground.access.passwords import hashed_secret, new_key
 from flightd.ground.access.roles import Role
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
 from flightd.ground.drop import Drop
-from flightd.ground.ground_store.batch import Batch, SentLook
+from flightd.ground.flights import flight_row
+from flightd.ground.ground_store import feeder as feeding
+from flightd.ground.ground_store.batch import Batch, SentFlight, SentLook
 from flightd.ground.ground_store.feeder import Feeder
 from flightd.ground.ground_store.open_store import opened_store
 from flightd.ground.ground_store.questions import Question
@@ -211,6 +214,10 @@ async def test_a_drone_delivers_over_http_once(hall: Path, tmp_path: Path) -> No
         }
         status, told = await program.post("/deliveries", {"site": "hall 3", "source": "north", "looks": [{}]})
         assert (status, "not a batch" in told["refused"]) == (400, True)
+        flight = SentFlight("x", "north", 5, None, "", "", "", "", None, None)
+        for wrong in (replace(flight, id="x"), replace(flight, id="0" * 64, began_ns=1 << 63)):
+            status, told = await program.post("/deliveries", Batch("hall 3", "north", flights=(wrong,)))
+            assert (status, told["refused"][:7]) == (400, "north: "), told
         assert (await program.post("/deliveries/missing-pictures", {"names": ["../etc"]}))[0] == 400
         assert (await program.get("/sites"))[0] == 403
 
@@ -276,13 +283,75 @@ def test_the_station_feeds_what_changes_and_no_more(
         assert store.counts()["looks"] == 10
 
 
-def test_a_store_that_is_away_is_fed_when_it_is_back(
-    hall: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    from flightd.core.errors import UnavailableError
+def test_lines_of_the_audit_are_fed_though_a_file_gets_the_inode_of_an_older_one(tmp_path: Path) -> None:
+    state = tmp_path / "state"
+    state.mkdir()
+    file, aside, older = (state / name for name in ("audit.jsonl", "audit.jsonl.1", "older"))
 
+    def write(*numbers: int) -> None:
+        file.write_text("".join(f'{{"person": "ann", "n": {n}}}\n' for n in numbers))
+
+    with opened_store(str(tmp_path / "store.db")) as store:
+        feeder = Feeder(store, None, (), state)
+        write(1, 2, 3)
+        feeder.feed()
+        file.rename(aside)
+        write(4)
+        feeder.feed()
+        inode = aside.rename(older).stat().st_ino
+        file.rename(aside)
+        older.rename(file)
+        write(5)
+        assert file.stat().st_ino == inode
+        feeder.feed()
+        assert store.counts()["audit"] == 5
+
+
+def test_a_flight_that_was_cut_off_is_fed_though_its_log_never_changes_again(
+    tmp_path: Path, recorded_flight: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = tmp_path / "hall" / "flight.mcap"
+    log.parent.mkdir()
+    whole = (recorded_flight / "flight.mcap").read_bytes()
+    log.write_bytes(whole[: len(whole) // 2])
+    with opened_store(str(tmp_path / "store.db")) as store:
+        feeder = Feeder(store, log.parent, (), tmp_path / "state")
+        feeder.feed()
+        assert store.counts()["flights"] == 0, "it may be written still"
+        monkeypatch.setattr(flight_row, "_RUNNING_S", 0.0)  # as time goes by
+        feeder.feed()
+        assert store.counts()["flights"] == 1
+        monkeypatch.undo()
+        other = log.with_name("other.mcap")
+        other.write_bytes(whole[: len(whole) // 3])
+        os.utime(other, (4e9, 4e9))
+        feeder.feed()
+        (flight,) = [row for site in store.sites() for row in store.flights(site["site"])]
+        assert flight["outcome"] == "unfinished"
+
+
+def test_older_inventories_are_fed_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number, day in enumerate(("a", "c", "b")):
+        counted_store(tmp_path / "hall" / day)
+        flown_log(tmp_path / "hall" / day / "flight.mcap", RACKS)
+        os.utime(tmp_path / "hall" / day / "inventory.db", (1e9 + number,) * 2)
+    fed: list[str] = []
+    monkeypatch.setattr(feeding, "deliver_inventory", lambda folder, *_: fed.append(folder.name))
+    with opened_store(str(tmp_path / "store.db")) as store:
+        Feeder(store, tmp_path / "hall", (), tmp_path / "state").feed()
+    assert fed == ["a", "c", "b"]
+
+
+@pytest.mark.parametrize("failure", [UnavailableError("away"), OverflowError("too large")])
+def test_a_store_that_is_away_is_fed_when_it_is_back(
+    hall: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    failure: Exception,
+) -> None:
     def away(_: GroundStore, batch: Batch) -> None:
-        raise UnavailableError("away", file=batch.source)
+        raise failure
 
     with opened_store(str(tmp_path / "store.db")) as store:
         feeder = Feeder(store, hall, (), tmp_path / "state")

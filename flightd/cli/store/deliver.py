@@ -63,13 +63,14 @@ def deliver(
         stopped = str(err)
     if as_json:
         print(json.dumps(asdict(done) | ({"stopped": stopped} if unless else {})))
-        return
-    print(
-        f"{done.looks} looks delivered, {done.changed} changed, {done.already} were there already; "
-        f"{done.pictures} pictures, {done.flights} flights, {done.decisions} decisions"
-    )
-    if stopped:
-        print(stopped)
+    else:
+        print(
+            f"{done.looks} looks delivered, {done.changed} changed, {done.already} were there already; "
+            f"{done.pictures} pictures, {done.flights} flights, {done.decisions} decisions"
+        )
+        if stopped:
+            print(stopped)
+    done.check_clocks()
 
 
 def prune(

@@ -91,6 +91,15 @@ class Batch:
     decisions: tuple[SentDecision, ...] = ()
     people: tuple[SentPerson, ...] = ()
     audit: tuple[SentLine, ...] = ()
+    planned_ns: int = 0
+    """Of the newest look of the inventory whose plan the `places` are; 0 where that is not said.  No part of
+    the `id`."""
+
+    @property
+    def is_plan(self) -> bool:
+        """Places alone: the same again may be news, where another plan came in between."""
+        return not (self.looks or self.flights or self.decisions or self.people or self.audit)
+
     @property
     def id(self) -> bytes:
         """The same for the same content, whoever sends it."""
@@ -163,19 +172,21 @@ class Batch:
             )
         yield from (("seen_ns of a person", person.seen_ns) for person in self.people)
         yield from (("utc_ns of an audit line", line.utc_ns) for line in self.audit)
+        yield ("planned_ns", self.planned_ns)
         yield from (("pallets_deep", place.pallets_deep << 32) for place in self.places)  # 32 bits
 
 
 @dataclass(frozen=True, slots=True)
 class Receipt:
     """What is in the store now, through to its disk: `new` looks, `changed` in their standing, and those that
-    it had `already`.  `store` is the store's own id."""
+    it had `already`.  Not there are those `ahead` of its clock.  `store` is the store's own id."""
 
     store: str
     batch: str
     new: int
     changed: int
     already: int
+    ahead: int = 0
 
 
 def _is_text(text: str) -> bool:

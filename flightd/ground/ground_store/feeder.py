@@ -117,6 +117,7 @@ class Feeder:
         done = Delivered()
         deliver_inventory(self._stores.folder(name), site, self._source, self._store, done)
         deliver_decisions(decisions, site, self._source, self._store, done)
+        done.check_clocks()
         return True
 
     def _flights(self) -> Iterator[_Part]:

@@ -12,6 +12,7 @@ from typing import Protocol, TypeVar
 
 from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.core.errors import InputError
 from flightd.core.inventory import Observation, PlannedLocation
 from flightd.ground.decision_book import Decision
 from flightd.ground.flights.flight_row import FlightRow, read_rows
@@ -65,22 +66,33 @@ class Delivered:
     pictures: int = 0
     flights: int = 0
     decisions: int = 0
+    ahead: int = 0
+    """Left where they are: of a time that has not come yet where the store is."""
 
     def add(self, receipt: Receipt) -> None:
         self.looks += receipt.new
         self.changed += receipt.changed
         self.already += receipt.already
+        self.ahead += receipt.ahead
+
+    def check_clocks(self) -> None:
+        """InputError where looks were left."""
+        if self.ahead:
+            raise InputError(
+                "looks of a time that has not come yet stay here: the clock of drone or store is wrong",
+                remedy="set it; what was counted by a wrong one is counted again, in another folder",
+            )
 
 
 def deliver_inventory(folder: Path, site: str, source: str, target: Target, done: Delivered) -> None:
     """All looks of an inventory, with their pictures; each batch is in the store before the next is sent."""
     with opened_for_reading(folder, untouched=True) as inventory:
-        planned = [
-            PlannedLocation(record.code, record.node, record.pallets_deep) for record in inventory.locations()
-        ]
+        records = inventory.locations()
+        planned_ns = max((record.observation.utc_ns for record in records if record.observation), default=0)
+        planned = [PlannedLocation(record.code, record.node, record.pallets_deep) for record in records]
         looks = inventory.looks()
         for places in _parts(planned):
-            target.take(Batch(site, source, places=tuple(places)))
+            target.take(Batch(site, source, places=tuple(places), planned_ns=planned_ns))
         for part in _parts(looks):
             kept = target.standings([seen.id for seen, _ in part])
             missing = [

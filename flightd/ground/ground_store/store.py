@@ -6,14 +6,15 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
 from flightd.core.errors import InputError
-from flightd.core.inventory import LocationState
+from flightd.core.inventory import LocationState, Standing
 from flightd.ground.drop import Drop
 from flightd.ground.ground_store import events, outbox, pages, questions
-from flightd.ground.ground_store.batch import Batch, Receipt
+from flightd.ground.ground_store.batch import Batch, Receipt, SentLook
 from flightd.ground.ground_store.engine import Engine, Session, listed
 from flightd.ground.ground_store.events import Event
 from flightd.ground.ground_store.evidence import Evidence
@@ -24,6 +25,9 @@ from flightd.ground.ground_store.parquet import export
 from flightd.ground.ground_store.questions import Question
 from flightd.ground.ground_store.take_batch import Taken, take_batch
 
+MOST_AHEAD_NS = 1_800_000_000_000
+"""So far ahead of the store's clock a look may be: clocks differ, and a simulated flight may be flown faster
+than time goes by."""
 _LOOKED_FOR_AT_ONCE = 16
 """Pictures."""
 
@@ -61,23 +65,24 @@ class GroundStore:
 
     def take(self, batch: Batch) -> Receipt:
         """Keep a batch.  When this returns, all of it is on the store's disk; where it raises, perhaps so:
-        the same batch again changes nothing."""
+        the same batch again changes nothing.
+
+        Looks of a time that has not come yet are left to their sender, unless they are withdrawn: newer than
+        all that is counted later, they would stand for good."""
         batch.check()
-        identity = batch.id
+        identity, utc_ns = batch.id, self._utc_ns()
+        looks = tuple(look for look in batch.looks if not _is_ahead(look, utc_ns))
+        ahead, is_noted = len(batch.looks) - len(looks), not batch.is_plan
         with self._engine.writing() as session:
-            if session.rows("SELECT 1 FROM delivery WHERE id = ?", identity):
+            if is_noted and session.rows("SELECT 1 FROM delivery WHERE id = ?", identity):
                 taken = Taken()
             else:
-                taken = take_batch(self._engine, session, batch, self._utc_ns())
-                session.run(
-                    "INSERT INTO delivery VALUES (?, ?, ?, ?)",
-                    identity,
-                    batch.source,
-                    self._utc_ns(),
-                    len(batch.looks),
-                )
-        already = len(batch.looks) - taken.new - taken.changed
-        return Receipt(self.id, identity.hex(), taken.new, taken.changed, already)
+                taken = take_batch(self._engine, session, replace(batch, looks=looks), utc_ns)
+                if is_noted and not ahead:
+                    note = "INSERT INTO delivery VALUES (?, ?, ?, ?)"
+                    session.run(note, identity, batch.source, utc_ns, len(looks))
+        already = len(looks) - taken.new - taken.changed
+        return Receipt(self.id, identity.hex(), taken.new, taken.changed, already, ahead)
 
     def standings(self, looks: Sequence[str]) -> dict[str, int]:
         """Of these looks by id, those that the store has, each with its standing there."""
@@ -217,3 +222,7 @@ class GroundStore:
             raise InputError(f"a page has 1 to {MOST_ROWS} rows", key=f"limit={limit}")
         with self._engine.reading() as session:
             yield session, pages.site_id(session, site)
+
+
+def _is_ahead(look: SentLook, utc_ns: int) -> bool:
+    return look.observation.utc_ns > utc_ns + MOST_AHEAD_NS and look.standing is not Standing.WITHDRAWN

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from flightd.core.inventory import Observation, PlannedLocation, Standing
+from flightd.core.inventory import Observation, Standing
 from flightd.ground.ground_store.batch import Batch, SentDecision, SentLook
 from flightd.ground.ground_store.derived import Moment, Touched, renew
 from flightd.ground.ground_store.engine import Engine, Session, listed
@@ -60,7 +60,7 @@ def take_batch(engine: Engine, session: Session, batch: Batch, utc_ns: int) -> T
     taken = Taken()
     if batch.site:
         site, noted = _site(session, batch.site), Noted(session, batch.site, utc_ns)
-        taken = _take_looks(engine, session, site, batch.places, batch.looks, noted)
+        taken = _take_looks(engine, session, site, batch, noted)
         _take_flights(session, site, batch)
         _take_decisions(session, site, batch.decisions, noted)
         noted.write()
@@ -99,24 +99,14 @@ def _take_decisions(session: Session, site: int, decisions: Sequence[SentDecisio
         noted.note(EventKind.PLACE_DECIDED, {"location": one.place, "what": one.what, "who": one.who})
 
 
-def _take_looks(
-    engine: Engine,
-    session: Session,
-    site: int,
-    planned: Sequence[PlannedLocation],
-    looks: Sequence[SentLook],
-    noted: Noted,
-) -> Taken:
-    nodes = {place.code: place.node for place in planned}
-    depths = {place.code: place.pallets_deep for place in planned}
+def _take_looks(engine: Engine, session: Session, site: int, batch: Batch, noted: Noted) -> Taken:
+    looks = batch.looks
+    nodes = {place.code: place.node for place in batch.places}
     for look in looks:
         pose = look.observation.pose
         nodes.setdefault(look.observation.location, pose.node if pose else "")
     places = _places(session, site, nodes)
-    session.run_many(  # the greatest, in whatever order they come: 1 may be of who does not know
-        "UPDATE place SET pallets_deep = ? WHERE id = ? AND pallets_deep < ?",
-        [(deep, places[code], deep) for code, deep in depths.items()],
-    )
+    _follow_plan(session, places, batch)
     unique: dict[str, SentLook] = {}
     for look in looks:
         known = unique.get(look.observation.id)
@@ -137,6 +127,19 @@ def _take_looks(
     runs |= _run_ids(session, site, {look.observation.run for look in risen})
     renew(session, _touched([*new, *risen], places, runs), noted)
     return Taken(len(new), len(risen))
+
+
+def _follow_plan(session: Session, places: dict[str, int], batch: Batch) -> None:
+    """Depth and node of places.  The depth is the greatest, in whatever order they come: 1 may be of who
+    does not know.  The node is of the newest plan: an inventory older than the place's look does not say."""
+    session.run_many(
+        "UPDATE place SET pallets_deep = ? WHERE id = ? AND pallets_deep < ?",
+        [(plan.pallets_deep, places[plan.code], plan.pallets_deep) for plan in batch.places],
+    )
+    session.run_many(
+        "UPDATE place SET node = ? WHERE id = ? AND node <> ? AND coalesce(utc_ns, 0) <= ?",
+        [(plan.node, places[plan.code], plan.node, batch.planned_ns) for plan in batch.places if plan.node],
+    )
 
 
 def _site(session: Session, name: str) -> int:

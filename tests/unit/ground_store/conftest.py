@@ -56,6 +56,14 @@ def store(engine: Callable[[], Engine], tmp_path: Path) -> Iterator[GroundStore]
 
 
 @pytest.fixture
+def far_store(engine: Callable[[], Engine], tmp_path: Path) -> Iterator[GroundStore]:
+    """One for which no time is to come."""
+    evidence = FolderEvidence(tmp_path / "evidence")
+    with GroundStore(engine(), evidence, lambda: (1 << 63) - 1) as opened:
+        yield opened
+
+
+@pytest.fixture
 def place(tmp_path: Path) -> Path:
     """A station and its drop folders."""
     return make_place(tmp_path)

@@ -7,8 +7,10 @@ import json
 import random
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import psycopg
@@ -295,3 +297,65 @@ def test_only_what_the_store_has_is_pruned(store: GroundStore, tmp_path: Path) -
         assert lost in [look for look, _ in inventory.looks()]
         assert prune(inventory.folder, store).looks == 0
     assert store.counts()["looks"] == 25
+
+
+def test_pictures_are_asked_for_in_parts_that_are_answered_in_time(
+    store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[int] = []
+    missing = store.missing_pictures
+
+    def noted(names: Sequence[str]) -> set[str]:
+        asked.append(len(names))
+        return missing(names)
+
+    monkeypatch.setattr(store, "missing_pictures", noted)
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for number in range(120):
+            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
+        done = Delivered()
+        deliver_inventory(inventory.folder, SITE, "north", store, done)
+        assert (done.pictures, asked) == (120, [50, 50, 20])
+        assert prune(inventory.folder, store).stay == 0
+        assert asked[3:] == [50, 50, 10]
+
+
+def test_pictures_far_away_are_looked_for_together(store: GroundStore) -> None:
+    together = threading.Barrier(4, timeout=30.0)
+
+    class Far(FolderEvidence):
+        def has(self, name: str) -> bool:
+            together.wait()
+            return name < "4"
+
+    store.evidence = Far(Path("unused"))
+    assert store.missing_pictures([f"{n}" for n in range(8)]) == {"4", "5", "6", "7"}
+
+
+def test_what_a_clock_that_is_ahead_counted_stays_at_the_drone_and_is_told(
+    engine: Callable[[], Engine], tmp_path: Path
+) -> None:
+    with (
+        GroundStore(engine(), FolderEvidence(tmp_path), lambda: _BEGIN + 30 * 86_400 * _NS) as store,
+        SqliteStore(tmp_path / "inventory") as inventory,
+    ):
+        for number in range(25):  # the last five are a month ahead
+            inventory.commit(seen(number))
+        done = Delivered()
+        deliver_inventory(inventory.folder, SITE, "north", store, done)
+        assert (done.looks, done.ahead) == (20, 5)
+        with pytest.raises(InputError, match="stay here: the clock of drone or store is wrong; set it"):
+            done.check_clocks()
+        inventory.commit(replace(seen(3), run="next", utc_ns=_BEGIN + 70 * 86_400 * _NS))
+        assert prune(inventory.folder, store).stay == 5
+        assert {row["run"] for row in store.stock(SITE)} == {"run 1"}
+
+
+def test_places_follow_the_plan_of_the_newest_inventory(store: GroundStore, tmp_path: Path) -> None:
+    for name, number in (("monday", 3), ("tuesday", 13)):
+        with SqliteStore(tmp_path / name) as inventory:
+            inventory.plan([PlannedLocation("A-3", f"node of {name}")])
+            inventory.commit(seen(number))
+    for name in ("monday", "tuesday", "monday"):
+        deliver_inventory(tmp_path / name, SITE, "north", store, Delivered())
+    assert [row["node"] for row in store.stock(SITE)] == ["node of tuesday"]

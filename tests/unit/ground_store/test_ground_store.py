@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -24,13 +26,13 @@ from flightd.core.inventory import (
     UndecidedCode,
 )
 from flightd.core.types import CodeRead
-from flightd.ground.ground_store import migrations
+from flightd.ground.ground_store import derived, migrations, postgres_engine
 from flightd.ground.ground_store.batch import Batch, SentDecision, SentFlight, SentLine, SentLook, SentPerson
-from flightd.ground.ground_store.engine import Engine
+from flightd.ground.ground_store.engine import Engine, Session
 from flightd.ground.ground_store.evidence import FolderEvidence
 from flightd.ground.ground_store.migrations import newest_version
 from flightd.ground.ground_store.pages import Mark
-from flightd.ground.ground_store.postgres_engine import PostgresEngine
+from flightd.ground.ground_store.postgres_engine import PostgresEngine, PostgresSession
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
 
@@ -38,6 +40,11 @@ _NS = 1_000_000_000
 _DAY = 86_400 * _NS
 _BEGIN = 1_760_000_000 * _NS
 SITE = "hall 3"
+
+
+FLOWN = SentFlight("ab" * 32, "north", _BEGIN, 90.0, "every node", "completed", "", "good", 12, 12)
+
+DECIDED = SentDecision("decision-1", "A-1", _BEGIN, 0, "put_right", "ann", "label was torn")
 
 
 def read(text: str) -> CodeRead:
@@ -292,17 +299,15 @@ def rows_of(opened: Engine, question: str) -> list[tuple[Any, ...]]:
 def test_flights_decisions_people_and_audit_are_taken_once(
     store: GroundStore, engine: Callable[[], Engine]
 ) -> None:
-    flight = SentFlight("ab" * 32, "north", _BEGIN, 61.5, "every node", "flying", "", "", 12, None)
-    over = SentFlight("ab" * 32, "north", _BEGIN, 90.0, "every node", "completed", "", "good", 12, 12)
-    decided = SentDecision("decision-1", "A-1", _BEGIN, 0, "put_right", "ann", "label was torn")
+    flight = replace(FLOWN, duration_s=61.5, outcome="flying", verdict="", nodes_visited=None)
     lines = [
         SentLine(_BEGIN + n, "ann", "start", "north", "accepted", f'{{"time": "…", "n": {n}}}')
         for n in range(2)
     ]
-    for n, flown in enumerate((flight, over, over)):
+    for n, flown in enumerate((flight, FLOWN, FLOWN)):
         people = (SentPerson("ann", ("observer", "operator", "operator")[n], _BEGIN + min(n, 1)),)
         audit = tuple(lines[: n + 1])
-        store.take(Batch(SITE, "station", flights=(flown,), decisions=(decided,), people=people, audit=audit))
+        store.take(Batch(SITE, "station", flights=(flown,), decisions=(DECIDED,), people=people, audit=audit))
     store.take(Batch(SITE, "other", people=(SentPerson("ann", "admin", _BEGIN),)))
     (row,) = store.flights(SITE)
     assert (row["outcome"], row["duration_s"], row["nodes_visited"]) == ("completed", 90.0, 12)
@@ -317,12 +322,111 @@ def test_flights_decisions_people_and_audit_are_taken_once(
     ]
 
 
+def test_an_older_copy_of_a_log_takes_nothing_from_its_flight(store: GroundStore) -> None:
+    aborted = replace(FLOWN, outcome="aborted", reason="wind", verdict="poor")
+    cut = replace(
+        FLOWN, duration_s=40.0, outcome="unfinished", reason="low battery", verdict="", nodes_visited=3
+    )
+    unjudged = replace(
+        aborted, reason="", verdict="", duration_s=None, nodes_planned=None, nodes_visited=None
+    )
+
+    def after(*sent: SentFlight) -> tuple[Any, ...]:
+        for flight in sent:
+            store.take(Batch(SITE, "station", flights=(flight,)))
+        (row,) = store.flights(SITE)
+        names = ("outcome", "reason", "verdict", "duration_s", "nodes_planned", "nodes_visited")
+        return tuple(row[name] for name in names)
+
+    assert after(cut) == ("unfinished", "low battery", "", 40.0, 12, 3)
+    whole = ("aborted", "wind", "poor", 90.0, 12, 12)
+    assert after(aborted) == whole
+    assert after(replace(cut, mission="x"), unjudged) == whole
+    assert after(FLOWN) == ("completed", "", "good", 90.0, 12, 12)
+
+
+def test_a_place_belongs_to_the_node_of_the_newest_plan(store: GroundStore) -> None:
+    def after(node: str, planned_ns: int) -> str:
+        plan = (PlannedLocation("A-1", node),)
+        store.take(Batch(SITE, "north", places=plan, planned_ns=planned_ns))
+        return str(store.stock(SITE)[0]["node"])
+
+    assert after("A1", 0) == "A1"
+    store.take(batch(look("A-1", "PAL-1")))
+    assert after("B7", _BEGIN) == "B7"
+    assert after("A1", _BEGIN - 1) == "B7", "of an inventory from before the look"
+    assert after("A1", 0) == "B7", "of who does not say from when it is"
+    assert after("A1", _BEGIN + _DAY) == "A1", "a plan that was there before"
+    assert after("", _BEGIN + _DAY) == "A1"
+
+
+def test_looks_of_a_clock_that_is_ahead_stay_with_their_sender(
+    engine: Callable[[], Engine], tmp_path: Path
+) -> None:
+    clock = [_BEGIN]
+    with GroundStore(engine(), FolderEvidence(tmp_path), lambda: clock[0]) as store:
+        year_ns = 365 * _DAY
+        ahead = look("A-1", "PAL-9", run="ahead", at_ns=_BEGIN + year_ns)
+        sent = batch(look("A-2", at_ns=_BEGIN + 60 * _NS), ahead)
+        assert [store.take(sent).ahead for _ in range(2)] == [1, 1]
+        assert store.standings([ahead.observation.id]) == {}
+        store.take(batch(look("A-1", "PAL-1")))
+        assert places_of(store) == {"A-1": ("read", ["PAL-1"], "monday"), "A-2": ("empty", [], "monday")}
+        assert [run["run"] for run in store.runs(SITE)] == ["monday"]
+        clock[0] += year_ns  # or the store's clock was behind
+        receipt = store.take(sent)
+        assert (receipt.new, receipt.already, receipt.ahead) == (1, 1, 0)
+        clock[0] -= year_ns
+        assert places_of(store)["A-1"] == ("read", ["PAL-9"], "ahead"), "taken by an older flightd, say"
+        store.take(batch(replace(ahead, standing=Standing.WITHDRAWN)))
+        assert places_of(store)["A-1"] == ("read", ["PAL-1"], "monday")
+
+
+def test_a_late_delivery_asks_no_more_the_more_runs_came_after_it(
+    store: GroundStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for run in range(1, 31):
+        seen = look("A-1", f"PAL-{run % 3}", run=f"run {run}", at_ns=_BEGIN + run * _DAY)
+        store.take(batch(seen))
+    asked: list[str] = []
+    one = derived._one  # noqa: SLF001
+
+    def noted(session: Session, question: str, *values: object) -> object:
+        asked.append(question)
+        return one(session, question, *values)
+
+    monkeypatch.setattr(derived, "_one", noted)
+    store.take(batch(look("A-1", "PAL-0", run="late")))
+    assert len(asked) <= 2
+    assert [row["before_run"] for row in store.differences(SITE, "run 1")] == ["late"]
+
+
 @pytest.mark.parametrize("engine", ["postgres"], indirect=True)
-def test_looks_lie_in_the_partition_of_their_month(store: GroundStore, engine: Callable[[], Engine]) -> None:
+def test_a_host_of_the_database_that_is_gone_is_noticed(
+    engine: Callable[[], Engine], cluster: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(postgres_engine, "_READ_S", 0.05)
+    opened = engine()
+    with pytest.raises(UnavailableError, match="statement timeout"), opened.reading() as session:
+        session.rows("SELECT pg_sleep(60)")
+    opened.close()
+    for url, idle in ((cluster, "10"), (f"{cluster}&keepalives_idle=99", "99")):
+        opened = PostgresEngine(url)
+        with opened.writing() as session:
+            assert isinstance(session, PostgresSession)
+            asked = session.connection.info.get_parameters()
+        assert (asked["keepalives_idle"], asked["tcp_user_timeout"]) == (idle, "15000")
+        opened.close()
+
+
+@pytest.mark.parametrize("engine", ["postgres"], indirect=True)
+def test_looks_lie_in_the_partition_of_their_month(
+    far_store: GroundStore, engine: Callable[[], Engine]
+) -> None:
     november_ns = int(datetime(2025, 11, 1, tzinfo=UTC).timestamp()) * _NS
     times = (november_ns - 1, november_ns, november_ns + _DAY, 5, (1 << 63) - 1)
     for n, at_ns in enumerate(times):
-        store.take(batch(look(f"A-{n}", at_ns=at_ns)))
+        far_store.take(batch(look(f"A-{n}", at_ns=at_ns)))
     where = rows_of(
         engine(),
         "SELECT place.code, observation.tableoid::regclass::text FROM observation"
@@ -339,9 +443,13 @@ def test_looks_lie_in_the_partition_of_their_month(store: GroundStore, engine: C
     assert not {"observation_2025_10", "observation_beyond"} & set(asked.split())
 
 
-def test_times_of_clocks_far_off_are_kept(store: GroundStore) -> None:
-    store.take(batch(look("A-1", "early", at_ns=5), look("A-1", "late", at_ns=(1 << 63) - 1)))
-    assert [row["reads"][0]["text"] for row in store.history(SITE, "A-1")] == ["late", "early"]
+def test_times_of_clocks_far_off_are_kept(far_store: GroundStore) -> None:
+    far_store.take(batch(look("A-1", "early", at_ns=5), look("A-1", "late", at_ns=(1 << 63) - 1)))
+    assert [row["reads"][0]["text"] for row in far_store.history(SITE, "A-1")] == ["late", "early"]
+
+
+def deliver(**parts: Any) -> Callable[[GroundStore], object]:
+    return lambda store: store.take(Batch(SITE, "drone-1", **parts))
 
 
 @pytest.mark.parametrize(
@@ -356,6 +464,19 @@ def test_times_of_clocks_far_off_are_kept(store: GroundStore) -> None:
         (lambda s: s.take(batch(look("A-1"), site="")), "of no site"),
         (lambda s: s.take(batch(look("A-1", at_ns=-1))), "drone-1: A-1: a look at no time"),
         (lambda s: s.take(batch(*[look()] * 501)), "a batch of 501 looks; send at most 500"),
+        (lambda s: s.take(batch(look("A" * 301))), "AAA…: a name of 301 characters; give at most 300"),
+        (lambda s: s.take(batch(look(evidence="x"))), "the picture 'x' is no SHA-256 in hexadecimal"),
+        (deliver(flights=(replace(FLOWN, id="x"),)), "the flight 'x' is no SHA-256"),
+        (deliver(flights=(replace(FLOWN, began_ns=1 << 63),)), "drone-1: began_ns is out of range"),
+        (deliver(flights=(replace(FLOWN, nodes_visited=10**400),)), "nodes_visited is out of range"),
+        (deliver(flights=(replace(FLOWN, duration_s=math.nan),)), "duration_s is out of range"),
+        (deliver(decisions=(replace(DECIDED, what="\0"),)), "the name '\\x00' is no text"),
+        (deliver(decisions=(replace(DECIDED, seen_ns=-1),)), "seen_ns of a decision is out of range"),
+        (deliver(people=(SentPerson("ann", "\ud800", 0),)), "is no text"),
+        (deliver(people=(SentPerson("ann\0", "admin", 0),)), "is no text"),
+        (deliver(people=(SentPerson("ann", "admin", 1 << 63),)), "seen_ns of a person is out of range"),
+        (deliver(audit=(SentLine(1 << 63, "", "", "", "", ""),)), "utc_ns of an audit line is out of range"),
+        (deliver(places=(PlannedLocation("A-1", "A1", 1 << 31),)), "pallets_deep is out of range"),
         (lambda s: Mark.read("99999999999999999999-00"), "no mark of a page"),
     ],
 )
