@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 import msgspec
 
 from flightd.core.errors import FlightdError, UnavailableError
+from flightd.ground.ground_store.http_address import http_host
 from flightd.ground.ground_store.station_target import NoRedirect
-from flightd.ground.http_address import http_host
 
 MOST_ANSWER_BYTES = 32 << 20
 _MOST_REFUSAL_BYTES = 1 << 20

@@ -12,7 +12,7 @@ import msgspec
 
 from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.ground_store.batch import Batch, Receipt
-from flightd.ground.http_address import http_host, way_lost
+from flightd.ground.ground_store.http_address import http_host, way_lost
 
 _WAIT_S = 30.0
 _MOST_ANSWER_BYTES = 1 << 20

@@ -17,9 +17,9 @@ from typing import Any
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.utc_time import utc_text
 from flightd.ground.ground_store.events import Event
+from flightd.ground.ground_store.http_address import http_address, way_lost
 from flightd.ground.ground_store.station_target import NoRedirect
 from flightd.ground.ground_store.store import GroundStore
-from flightd.ground.http_address import http_address, way_lost
 
 _LOG = logging.getLogger(__name__)
 SECRET = "FLIGHTD_WEBHOOK_SECRET"  # noqa: S105 - the name of a variable
