@@ -200,8 +200,8 @@ class Store(Protocol):
     or observation again changes nothing.  They raise UnavailableError when the disk refuses.
     """
 
-    def plan(self, locations: Iterable[PlannedLocation]) -> None:
-        """Make locations known; new ones are not visited yet."""
+    def plan(self, locations: Iterable[PlannedLocation], site: str = "") -> None:
+        """Make locations known, of the site of that name; new ones are not visited yet."""
         ...
 
     def keep_evidence(self, jpeg: bytes) -> str:

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.errors import FlightdError, InputError
+from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import LocationRecord, Observation, Standing
 from flightd.core.topics import Document, Topic
 from flightd.ground.plain_files import is_plain_file, is_plain_folder, plain_file
@@ -43,16 +44,21 @@ class StockView:
 
 class Stores:
     """Under `root`: each folder with an `inventory.db`, named by its path from there (`.`: root itself);
-    below the `others` with their prefix before it.
+    below the `others` with their prefix before it.  `all_of_them`: however many there are, and however deep
+    they lie; for a page a large folder is not looked at to its end.
 
     Safe from any thread.  Nothing that a browser says is ever made a path: names are looked up."""
 
-    def __init__(self, root: Path | None, others: Sequence[ReadFolder] = ()) -> None:
+    def __init__(
+        self, root: Path | None, others: Sequence[ReadFolder] = (), *, all_of_them: bool = False
+    ) -> None:
         self._root = root
         self._others = tuple(others)
+        self._all_of_them = all_of_them
         self._known: dict[str, Path] = {}
         self._views: OrderedDict[str, StockView] = OrderedDict()
         self._sites: dict[Path, tuple[tuple[str, int, int], Site | None]] = {}
+        self._site_names: dict[Path, tuple[_Stamp, str]] = {}
 
     @property
     def title(self) -> str:
@@ -81,9 +87,15 @@ class Stores:
         return view
 
     def site_name(self, name: str) -> str:
-        """The name of the site that a store is of, by the map in the flight log beside it; empty without one.
-        InputError where there is no store of the name."""
-        site = self._site(self.folder(name))
+        """The name of the site that a store is of, as it says itself, else by the map in the flight log beside
+        it; empty without either.  InputError where there is no store of the name."""
+        folder, stamp = self.folder(name), _stamp(self.folder(name))
+        known = self._site_names.get(folder)
+        if known is None or known[0] != stamp:
+            self._site_names[folder] = known = stamp, _kept_site_name(folder)
+        if known[1]:
+            return known[1]
+        site = self._site(folder)
         return "" if site is None else site.name
 
     def looks(self, name: str, code: str) -> Sequence[tuple[Observation, Standing]]:
@@ -124,10 +136,10 @@ class Stores:
 
     def _named(self) -> Iterator[tuple[str, Path]]:
         if self._root is not None:
-            for folder in _folders(self._root):
+            for folder in _folders(self._root, self._all_of_them):
                 yield _name(folder, self._root), folder
         for other in self._others:
-            for folder in _folders(other.path):
+            for folder in _folders(other.path, self._all_of_them):
                 yield other.prefix + _name(folder, other.path), folder
 
     def _site(self, folder: Path) -> Site | None:
@@ -154,7 +166,19 @@ def _map_of(log: Path) -> Site | None:
     return None
 
 
-def _folders(root: Path) -> Iterator[Path]:
+def _kept_site_name(folder: Path) -> str:
+    try:
+        try:
+            with SqliteStore(folder, read_only=True) as store:
+                return store.site
+        except UnavailableError:  # its writer was cut off
+            with opened_for_reading(folder, untouched=True) as store:
+                return store.site
+    except (FlightdError, OSError):
+        return ""  # whoever opens it is told why it cannot be read
+
+
+def _folders(root: Path, all_of_them: bool) -> Iterator[Path]:
     """Folders with a store, not those behind links."""
     found = 0
     for looked, (folder, below, files) in enumerate(os.walk(root)):
@@ -162,9 +186,9 @@ def _folders(root: Path) -> Iterator[Path]:
         if _FILE in files and is_plain_file(here / _FILE):
             yield here
             found += 1
-        deep = len(here.relative_to(root).parts) >= _DEPTH
+        deep = len(here.relative_to(root).parts) >= _DEPTH and not all_of_them
         below[:] = [] if deep else sorted(n for n in below if not n.startswith(".") and n != "evidence")
-        if looked >= _MOST_FOLDERS or found >= _MOST_STORES:
+        if (looked >= _MOST_FOLDERS or found >= _MOST_STORES) and not all_of_them:
             return
 
 

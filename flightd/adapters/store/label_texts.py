@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from datetime import date
 from decimal import Decimal
 from typing import Any, Final, TypeAlias
@@ -35,10 +35,18 @@ def keep_texts(db: sqlite3.Connection, observation: str, texts: Iterable[LabelVa
     )
 
 
-def kept_texts(db: sqlite3.Connection) -> dict[str, tuple[LabelValue, ...]]:
-    """The texts of each observation by its id; TypeError or ValueError for rows of another program."""
-    rows = db.execute("SELECT observation, found FROM text_search").fetchall()
-    return {observation: tuple(map(_value, json.loads(found))) for observation, found in rows}
+def kept_texts(
+    db: sqlite3.Connection, where: str, values: Sequence[object]
+) -> dict[str, tuple[LabelValue, ...]]:
+    """The texts of the observations `where` that is so, by their ids; TypeError or ValueError for rows of
+    another program."""
+    rows = db.execute(f"SELECT observation, found FROM text_search WHERE {where}", values)  # noqa: S608
+    return {observation: found_texts(found) for observation, found in rows}
+
+
+def found_texts(found: str) -> tuple[LabelValue, ...]:
+    """What a search found; TypeError or ValueError for another program's."""
+    return tuple(map(_value, json.loads(found)))
 
 
 def was_searched(db: sqlite3.Connection, observation: str, asked: str) -> bool:

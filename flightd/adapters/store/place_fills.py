@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Sequence
 from typing import Final
 
 from flightd.core.inventory import CaseGrid, PlaceFill
@@ -35,12 +36,12 @@ def keep_fill(db: sqlite3.Connection, observation: str, fill: PlaceFill) -> None
     )
 
 
-def kept_fills(db: sqlite3.Connection) -> dict[str, PlaceFill]:
-    """How full the places are, by the observation's id; what a file of an earlier format lacks is not known.
-    ValueError for rows of another program."""
+def kept_fills(db: sqlite3.Connection, where: str, values: Sequence[object]) -> dict[str, PlaceFill]:
+    """How full places are, of the observations `where` that is so, by their ids; what a file of an earlier
+    format lacks is not known.  ValueError for rows of another program."""
     known = {row[1] for row in db.execute("PRAGMA table_info(place_fill)")}
     columns = ", ".join(name if name in known else "NULL" for name in _COLUMNS)
-    rows = db.execute(f"SELECT observation, {columns} FROM place_fill").fetchall()  # noqa: S608
+    rows = db.execute(f"SELECT observation, {columns} FROM place_fill WHERE {where}", values)  # noqa: S608
     return {
         observation: PlaceFill(share, overhang_m, lean_m, CaseGrid(wide, high) if wide and high else None)
         for observation, share, overhang_m, lean_m, wide, high in rows

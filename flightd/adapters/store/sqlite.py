@@ -12,97 +12,41 @@ from __future__ import annotations
 import json
 import sqlite3
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from flightd.adapters.store.evidence_pictures import EvidenceFolder
-from flightd.adapters.store.label_texts import (
-    TEXT_TABLES,
-    all_searches,
-    keep_texts,
-    kept_texts,
-    merge_texts,
-    was_searched,
+from flightd.adapters.store.kept_looks import (
+    NEWEST_CONFIRMED,
+    KeptLook,
+    elements,
+    ids_and_texts,
+    kept_look,
+    kept_looks,
 )
-from flightd.adapters.store.place_fills import CASE_COLUMNS, FILL_TABLES, LEAN_COLUMN, keep_fill, kept_fills
+from flightd.adapters.store.label_texts import all_searches, keep_texts, merge_texts, was_searched
+from flightd.adapters.store.place_fills import keep_fill
 from flightd.adapters.store.read_only import connect_read_only
-from flightd.adapters.store.undecided_codes import UNDECIDED_TABLES, keep_undecided, kept_undecided
-from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import (
-    CountPose,
-    LocationRecord,
-    LocationState,
-    Observation,
-    PlaceFill,
-    PlannedLocation,
-    Standing,
-    UndecidedCode,
+from flightd.adapters.store.schema import (
+    APPLICATION,
+    READABLE,
+    SCHEMA,
+    TAKEN_OVER,
+    VERSION,
+    WITH_DEPTHS,
+    WITH_SITE,
+    WITH_TEXTS,
 )
-from flightd.core.label_values import LabelValue
+from flightd.adapters.store.undecided_codes import keep_undecided
+from flightd.core.errors import InputError, UnavailableError
+from flightd.core.inventory import LocationRecord, Observation, PlannedLocation, Standing
 from flightd.core.scanning import CountedPlace
 from flightd.core.types import CodeRead
 
-_VERSION = 8
-_WITH_TEXTS = 3
-"""The first format with module sizes and printed text."""
-_WITH_FILLS = 4
-"""The first that says how full places are."""
-_WITH_AGAIN = 6
-"""The first that says which looks are second ones."""
-_WITH_DEPTHS = 7
-"""The first that says how many pallets stand behind one another."""
-_WITH_UNDECIDED = 8
-"""The first that has codes which stayed undecided."""
-_READABLE = (2, 3, 4, 5, 6, 7, _VERSION)
-"""Formats that are read as they are: what they lack is not known, and places are one pallet deep."""
-_APPLICATION = 0x666C7464
-"""`fltd`: SQLite's application id, so that another program's file is told apart."""
-_TAKEN_OVER = {
-    1: ("ALTER TABLE observation ADD COLUMN standing INTEGER NOT NULL DEFAULT 1",),
-    2: ("ALTER TABLE code_read ADD COLUMN module_px REAL", *TEXT_TABLES),
-    3: FILL_TABLES,
-    4: LEAN_COLUMN,
-    5: ("ALTER TABLE observation ADD COLUMN again INTEGER NOT NULL DEFAULT 0",),
-    6: (*CASE_COLUMNS, "ALTER TABLE location ADD COLUMN pallets_deep INTEGER NOT NULL DEFAULT 1"),
-    7: UNDECIDED_TABLES,
-}
-"""What makes a file of each earlier format one of the next."""
-_SCHEMA = """
-CREATE TABLE location (
-    code TEXT PRIMARY KEY,
-    node TEXT NOT NULL,
-    pallets_deep INTEGER NOT NULL DEFAULT 1
-) STRICT, WITHOUT ROWID;
-CREATE TABLE observation (
-    id TEXT PRIMARY KEY,
-    run TEXT NOT NULL,
-    location TEXT NOT NULL REFERENCES location (code),
-    utc_ns INTEGER NOT NULL,
-    state TEXT NOT NULL CHECK (state IN ('read', 'several', 'empty', 'unreadable', 'occluded')),
-    confidence REAL NOT NULL CHECK (confidence BETWEEN 0 AND 1),
-    node TEXT, x_m REAL, y_m REAL, height_m REAL, yaw_rad REAL,
-    evidence TEXT NOT NULL,
-    standing INTEGER NOT NULL DEFAULT 1,
-    again INTEGER NOT NULL DEFAULT 0
-) STRICT, WITHOUT ROWID;
-CREATE INDEX newest ON observation (location, utc_ns, id);
-CREATE TABLE code_read (
-    observation TEXT NOT NULL REFERENCES observation (id),
-    number INTEGER NOT NULL,
-    symbology TEXT NOT NULL,
-    text TEXT NOT NULL,
-    sure INTEGER NOT NULL,
-    agreeing INTEGER NOT NULL,
-    quality REAL NOT NULL,
-    gs1 TEXT NOT NULL,
-    module_px REAL,
-    PRIMARY KEY (observation, number)
-) STRICT, WITHOUT ROWID;
-""" + "".join(
-    f"{table};\n" for table in (*TEXT_TABLES, *FILL_TABLES, *LEAN_COLUMN, *CASE_COLUMNS, *UNDECIDED_TABLES)
-)
+_PART = 500
+"""Looks that are read at a time, where there may be many."""
 
 
 class SqliteStore:
@@ -121,7 +65,7 @@ class SqliteStore:
         self._file = folder / "inventory.db"
         if not create and not self._file.exists():
             raise InputError(f"{folder}: holds no inventory.db; give the folder of an inventory")
-        self._version = _VERSION
+        self._version = VERSION
         self._lock = threading.RLock()
         self.evidence = EvidenceFolder(folder / "evidence")
         try:
@@ -146,13 +90,13 @@ class SqliteStore:
         """Refuse what this program cannot read as it is."""
         with self._problems_named():
             version, application = self._marks()
-            if application != _APPLICATION:
+            if application != APPLICATION:
                 raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
             self._version = version
-            if version not in _READABLE:
-                older = version in _TAKEN_OVER
+            if version not in READABLE:
+                older = version in TAKEN_OVER
                 remedy = f"flightd inventory show {self.folder}" if older else "the flightd that wrote it"
-                problem = f"format {version}, known here is {_VERSION}"
+                problem = f"format {version}, known here is {VERSION}"
                 raise InputError(f"{self._file}: {problem}", remedy=f"open it once with {remedy}")
 
     def _marks(self) -> tuple[int, int]:
@@ -182,18 +126,18 @@ class SqliteStore:
                 tables = self._db.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
                 if not tables:
                     # one transaction: a power cut leaves an empty file or a whole one
-                    for statement in _SCHEMA.split(";\n"):
+                    for statement in SCHEMA:
                         self._db.execute(statement)
-                    self._db.execute(f"PRAGMA user_version = {_VERSION}")
-                    self._db.execute(f"PRAGMA application_id = {_APPLICATION}")
-                elif application != _APPLICATION:
+                    self._db.execute(f"PRAGMA user_version = {VERSION}")
+                    self._db.execute(f"PRAGMA application_id = {APPLICATION}")
+                elif application != APPLICATION:
                     raise InputError(f"{self._file}: a database, but no inventory; choose another folder")
-                elif version in _TAKEN_OVER:
-                    for statement in (s for v in range(version, _VERSION) for s in _TAKEN_OVER[v]):
+                elif version in TAKEN_OVER:
+                    for statement in (s for v in range(version, VERSION) for s in TAKEN_OVER[v]):
                         self._db.execute(statement)
-                    self._db.execute(f"PRAGMA user_version = {_VERSION}")
-                elif version != _VERSION:
-                    problem = f"format {version}, known here is {_VERSION}"
+                    self._db.execute(f"PRAGMA user_version = {VERSION}")
+                elif version != VERSION:
+                    problem = f"format {version}, known here is {VERSION}"
                     raise InputError(f"{self._file}: {problem}; use the flightd that wrote it")
 
     def __enter__(self) -> Self:
@@ -232,8 +176,18 @@ class SqliteStore:
             except (TypeError, ValueError) as err:  # of a row that is none of ours
                 raise InputError(f"{self._file}: no inventory, or a damaged one: {err}") from err
 
-    def plan(self, locations: Iterable[PlannedLocation]) -> None:
-        """Make locations known; node and depth of a known one follow the newest plan."""
+    @property
+    def site(self) -> str:
+        """The name of the site that was planned last; "" where that is not known."""
+        if self._version < WITH_SITE:
+            return ""
+        with self._reading():
+            row = self._db.execute("SELECT name FROM site").fetchone()
+        return str(row[0]) if row else ""
+
+    def plan(self, locations: Iterable[PlannedLocation], site: str = "") -> None:
+        """Make locations known, of the site of that name; node and depth of a known one follow the newest
+        plan, as the site does."""
         rows = [(location.code, location.node, location.pallets_deep) for location in locations]
         with self._transaction():
             self._db.executemany(
@@ -241,6 +195,11 @@ class SqliteStore:
                 " DO UPDATE SET node = excluded.node, pallets_deep = excluded.pallets_deep",
                 rows,
             )
+            if site:
+                self._db.execute(
+                    "INSERT INTO site VALUES (1, ?) ON CONFLICT (only_one) DO UPDATE SET name = excluded.name",
+                    (site,),
+                )
 
     def keep_evidence(self, jpeg: bytes) -> str:
         """Keep a picture; see `EvidenceFolder.keep`."""
@@ -291,7 +250,7 @@ class SqliteStore:
                 if newest.get(location, ("",))[0] != look:
                     newest[location] = look, []
                 if text is not None:
-                    read = CodeRead(symbology, text, (), bool(sure), agreeing, quality, _elements(gs1))
+                    read = CodeRead(symbology, text, (), bool(sure), agreeing, quality, elements(gs1))
                     newest[location][1].append(read)
         return tuple(CountedPlace(location, tuple(reads)) for location, (_, reads) in newest.items())
 
@@ -358,103 +317,77 @@ class SqliteStore:
         """Every location by its code, with its newest confirmed observation (of equally new ones, the
         greatest id)."""
         with self._reading():
-            looks = self._observations()
-            newest = {seen.location: seen for seen, standing in looks if standing == Standing.CONFIRMED}
-            deep = "pallets_deep" if self._version >= _WITH_DEPTHS else "1"
-            rows = self._db.execute(f"SELECT code, node, {deep} FROM location ORDER BY code").fetchall()  # noqa: S608
-        return [LocationRecord(code, node, newest.get(code), depth) for code, node, depth in rows]
+            looks = kept_looks(self._db, self._version, f"id IN ({NEWEST_CONFIRMED})")
+            newest = {seen.location: seen for seen, _ in looks}
+            return [LocationRecord(code, node, newest.get(code), deep) for code, node, deep in self._planned()]
+
+    def planned(self) -> list[PlannedLocation]:
+        """Every location by its code, whatever was seen there."""
+        with self._reading():
+            return [PlannedLocation(*row) for row in self._planned()]
+
+    def _planned(self) -> list[tuple[str, str, int]]:
+        deep = "pallets_deep" if self._version >= WITH_DEPTHS else "1"
+        return self._db.execute(f"SELECT code, node, {deep} FROM location ORDER BY code").fetchall()  # noqa: S608
 
     def history(self, location: str) -> list[Observation]:
         """Every look at one location, oldest first, pending and withdrawn ones too."""
-        with self._reading():
-            return [seen for seen, _ in self._observations(location)]
+        return [seen for seen, _ in self.looks(location)]
 
     def looks(self, location: str | None = None) -> list[tuple[Observation, Standing]]:
         """All looks, or those at one location, each with its standing, oldest first."""
+        chosen = () if location is None else ("location = ?", (location,))
         with self._reading():
-            return [(seen, Standing(standing)) for seen, standing in self._observations(location)]
+            return kept_looks(self._db, self._version, *chosen)
 
-    def _observations(self, location: str | None = None) -> list[tuple[Observation, int]]:
-        """All looks, or those at one location, with their standing, oldest first."""
-        reads: dict[str, list[CodeRead]] = {}
-        module = "module_px" if self._version >= _WITH_TEXTS else "NULL"
-        for seen, symbology, text, sure, agreeing, quality, gs1, module_px in self._db.execute(
-            f"SELECT observation, symbology, text, sure, agreeing, quality, gs1, {module} FROM code_read "  # noqa: S608
-            "ORDER BY observation, number"
-        ):
-            read = CodeRead(
-                symbology, text, (), bool(sure), agreeing, quality, _elements(gs1), module_px=module_px
-            )
-            reads.setdefault(seen, []).append(read)
-        texts = kept_texts(self._db) if self._version >= _WITH_TEXTS else {}
-        fills = kept_fills(self._db) if self._version >= _WITH_FILLS else {}
-        undecided = kept_undecided(self._db) if self._version >= _WITH_UNDECIDED else {}
-        again = "again" if self._version >= _WITH_AGAIN else "0"
-        rows = self._db.execute(
-            f"SELECT id, run, location, utc_ns, state, confidence, evidence, {again}, "  # noqa: S608
-            "node, x_m, y_m, height_m, yaw_rad, standing FROM observation "
-            "WHERE ?1 IS NULL OR location = ?1 ORDER BY utc_ns, id",
-            (location,),
-        )
-        return [
-            (
-                _observation(
-                    row[:-1],
-                    tuple(reads.get(row[0], ())),
-                    texts.get(row[0], ()),
-                    fills.get(row[0]),
-                    undecided.get(row[0], ()),
-                ),
-                row[-1],
-            )
-            for row in rows
-        ]
+    def looks_of_run(self, run: str) -> list[tuple[Observation, Standing]]:
+        """Those of one run, oldest first."""
+        with self._reading():
+            return kept_looks(self._db, self._version, "run = ?", (run,))
+
+    def parts(self, most: int) -> Iterator[list[KeptLook]]:
+        """All looks, oldest first, at most so many at a time: they may be more than fit into memory.  What is
+        written meanwhile is not among them."""
+        with self._reading():
+            rows = ids_and_texts(self._db, self._version)
+        while True:
+            with self._reading():
+                part = [kept_look(row) for row in rows.fetchmany(most)]
+            if not part:
+                return
+            yield part
+
+    def loaded(self, looks: Sequence[KeptLook]) -> list[tuple[Observation, Standing]]:
+        """All that is known of them, oldest first."""
+        marks = ", ".join("?" * len(looks))
+        with self._reading():
+            return kept_looks(self._db, self._version, f"id IN ({marks})", [look.id for look in looks])
+
+    def standing_looks(self) -> set[str]:
+        """The ids of the looks by which the locations stand."""
+        with self._reading():
+            return {row[0] for row in self._db.execute(NEWEST_CONFIRMED) if row[0] is not None}
 
     def merge(self, other: SqliteStore) -> int:
         """Take in everything of another store, pictures included; returns how many looks were new."""
-        with other._reading():
-            planned = [
-                PlannedLocation(record.code, record.node, record.pallets_deep) for record in other.locations()
-            ]
-            seen = other._observations()
-            searched = all_searches(other._db) if other._version >= _WITH_TEXTS else []
-        for observation, _ in seen:
-            if observation.evidence and other.evidence.path(observation.evidence).exists():
-                self.evidence.keep(other.evidence.path(observation.evidence).read_bytes())
+        for part in other.parts(_PART):
+            for name in {look.evidence for look in part if look.evidence}:
+                if other.evidence.path(name).exists():
+                    self.evidence.keep(other.evidence.path(name).read_bytes())
         with self._transaction():
             before = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
-            rows = [(location.code, location.node, location.pallets_deep) for location in planned]
             self._db.executemany(
                 "INSERT INTO location VALUES (?, ?, ?) ON CONFLICT (code) DO UPDATE"
                 " SET pallets_deep = max(pallets_deep, excluded.pallets_deep)",  # 1 may be: not known
-                rows,
+                [(location.code, location.node, location.pallets_deep) for location in other.planned()],
             )
-            for observation, standing in seen:
-                self._insert(observation, standing)
+            if other.site:
+                self._db.execute("INSERT OR IGNORE INTO site VALUES (1, ?)", (other.site,))
+            for part in other.parts(_PART):
+                for observation, standing in other.loaded(part):
+                    self._insert(observation, standing)
+            with other._reading():
+                searched = all_searches(other._db) if other._version >= WITH_TEXTS else []
             merge_texts(self._db, searched)
             after = self._db.execute("SELECT count(*) FROM observation").fetchone()[0]
         return int(after - before)
-
-
-def _elements(gs1: str) -> tuple[tuple[str, str], ...]:
-    """ValueError, TypeError for what are no GS1 elements."""
-    elements = tuple((ai, value) for ai, value in json.loads(gs1))
-    for ai, value in elements:
-        f"{ai}{value}".encode()  # half a character is no text
-        if not (isinstance(ai, str) and isinstance(value, str)):
-            raise TypeError("GS1 elements that are no text")
-    return elements
-
-
-def _observation(
-    row: tuple[Any, ...],
-    reads: tuple[CodeRead, ...],
-    texts: tuple[LabelValue, ...],
-    fill: PlaceFill | None,
-    undecided: tuple[UndecidedCode, ...],
-) -> Observation:
-    _, run, location, utc_ns, state, confidence, evidence, again, node, *place = row
-    pose = None if node is None else CountPose(node, *place)
-    seen = LocationState(state)
-    looked = run, location, utc_ns, seen, confidence, reads, pose, evidence, texts, fill
-    return Observation(*looked, again=bool(again), undecided=undecided)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from flightd.core.inventory import UndecidedCode
@@ -28,11 +28,16 @@ def keep_undecided(db: sqlite3.Connection, observation: str, codes: Iterable[Und
     )
 
 
-def kept_undecided(db: sqlite3.Connection) -> dict[str, tuple[UndecidedCode, ...]]:
-    """The codes by the observation's id; ValueError for rows of another program."""
+def kept_undecided(
+    db: sqlite3.Connection, where: str, values: Sequence[object]
+) -> dict[str, tuple[UndecidedCode, ...]]:
+    """The codes of the observations `where` that is so, by their ids; ValueError for rows of another
+    program."""
     kept: dict[str, tuple[UndecidedCode, ...]] = {}
     for observation, *code in db.execute(
-        "SELECT observation, symbology, text, looks FROM undecided_code ORDER BY observation, number"
+        f"SELECT observation, symbology, text, looks FROM undecided_code WHERE {where}"  # noqa: S608
+        " ORDER BY observation, number",
+        values,
     ):
         kept[observation] = (*kept.get(observation, ()), UndecidedCode(*code))
     return kept

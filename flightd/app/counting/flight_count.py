@@ -60,7 +60,8 @@ class FlightCount:
         with ExitStack() as opened:
             store = opened.enter_context(SqliteStore(folder))
             places = site.locations.values()
-            store.plan(PlannedLocation(place.code, place.node, place.pallets_deep) for place in places)
+            planned = (PlannedLocation(place.code, place.node, place.pallets_deep) for place in places)
+            store.plan(planned, site.name)
             store.withdraw_pending(self._run)
             counted = store.counted(self._run)
             self._stack.callback(opened.pop_all().close)

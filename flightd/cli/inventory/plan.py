@@ -38,6 +38,7 @@ def plan(
         raise InputError("has no locations", file=site_file, remedy="add a [[rack]]")
     with SqliteStore(folder) as store:
         places = site.locations.values()
-        store.plan(PlannedLocation(place.code, place.node, place.pallets_deep) for place in places)
+        planned = (PlannedLocation(place.code, place.node, place.pallets_deep) for place in places)
+        store.plan(planned, site.name)
         records = store.locations()
     print(json.dumps({"locations": len(records)}) if as_json else states_line(records))
