@@ -16,7 +16,7 @@ from flightd.core.inventory import LocationState, PlannedLocation
 from flightd.ground.flights import log_folder
 from flightd.ground.flights.flight_row import FlightRow, read_rows
 from flightd.ground.flights.flight_view import read_report, read_view
-from flightd.ground.flights.log_folder import find_logs, log_id, path_of
+from flightd.ground.flights.log_folder import FoundLogs, find_logs, log_id, path_of
 from flightd.ground.flights.sized_cache import SizedCache
 from flightd.ground.read_folders import read_folders
 from flightd.ground.stores import Stores
@@ -245,8 +245,19 @@ def test_a_folder_without_an_end_is_cut(tmp_path: Path, monkeypatch: pytest.Monk
     found = find_logs(tmp_path)
     assert (len(found.logs), found.cut) == (10, True)
     monkeypatch.setattr(log_folder, "MOST_LOGS", 100)
+    assert not find_logs(tmp_path).cut
     monkeypatch.setattr(log_folder, "MOST_ENTRIES", 20)
     assert find_logs(tmp_path).cut
+
+
+def test_folders_too_deep_to_be_looked_at_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a" / "b" / "c").mkdir(parents=True)
+    (tmp_path / "a" / "b" / "c" / "flight.mcap").write_bytes(b"")
+    monkeypatch.setattr(log_folder, "DEEPEST", 2)
+    assert find_logs(tmp_path) == FoundLogs((), cut=True)
+    monkeypatch.setattr(log_folder, "DEEPEST", 3)
+    assert len(find_logs(tmp_path).logs) == 1
+    assert not find_logs(tmp_path).cut
 
 
 def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def opened_for_reading(folder: Path, *, untouched: bool = False) -> Iterator[Sql
     with TemporaryDirectory(prefix="flightd-inventory-") as beside:
         copy = Path(beside)
         _copied(folder, copy)
-        with _opened(copy, folder) as store:
+        with _told_of(folder, copy), SqliteStore(copy, create=False) as store:
             store.folder, store.evidence = folder, EvidenceFolder(folder / "evidence")
             yield store
 
@@ -50,11 +50,14 @@ def _is_writable(folder: Path) -> bool:
     return may and os.access(folder, os.W_OK | os.X_OK, effective_ids=effective)
 
 
-def _opened(copy: Path, folder: Path) -> SqliteStore:
-    """The copied store; what is wrong with it is said of the original."""
+@contextmanager
+def _told_of(folder: Path, copy: Path) -> Iterator[None]:
+    """What is wrong with the copied store is said of the original."""
     try:
-        return SqliteStore(copy, create=False)
+        yield
     except (InputError, UnavailableError) as err:
+        if str(copy) not in str(err):
+            raise
         raise type(err)(str(err).replace(str(copy), str(folder))) from None
 
 

@@ -363,6 +363,17 @@ class SqliteStore:
         with self._reading():
             return kept_looks(self._db, self._version, f"id IN ({marks})", [look.id for look in looks])
 
+    def newest_run(self) -> str:
+        """The run of the newest look, "" without one."""
+        with self._reading():
+            row = self._db.execute("SELECT run FROM observation ORDER BY utc_ns DESC, id DESC LIMIT 1").fetchone()
+        return str(row[0]) if row else ""
+
+    def newest_ns(self) -> int:
+        """When the newest look was taken, UTC; 0 without one."""
+        with self._reading():
+            return int(self._db.execute("SELECT coalesce(max(utc_ns), 0) FROM observation").fetchone()[0])
+
     def standing_looks(self) -> set[str]:
         """The ids of the looks by which the locations stand."""
         with self._reading():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -29,7 +30,12 @@ def deliver(
     evidence: Pictures = None,
     site: Annotated[
         str,
-        typer.Option(metavar="NAME", help="Of which site it is.  Default: that of the flight log beside it."),
+        typer.Option(
+            metavar="NAME",
+            envvar="FLIGHTD_SITE",
+            help="Of which site it is.  Default: as the inventory says, else the flight log beside it.",
+            show_default=False,
+        ),
     ] = "",
     source: Annotated[
         str,
@@ -41,7 +47,8 @@ def deliver(
     """Deliver inventories with their pictures, flights, and decisions to the store.
 
     What is told to be delivered is on the store's disk.  However often it is cut and begun again, nothing is
-    lost and nothing is there twice.  The folders are only read.
+    lost and nothing is there twice.  The folders are only read.  What cannot be delivered is told in a line,
+    and costs the others nothing; the command ends with exit 1 then.
 
     \b
     Examples:
@@ -51,16 +58,18 @@ def deliver(
       flightd store deliver /var/lib/flightd --store counts.db --unless /run/flightd/armed
     """
     from flightd.ground.ground_store.between_flights import FlightBeganError
-    from flightd.ground.ground_store.deliver_folder import deliver_path
+    from flightd.ground.ground_store.deliver_folder import deliver_paths
     from flightd.ground.ground_store.sender import Delivered
 
     done, stopped = Delivered(), ""
     try:
         with between_flights(store, evidence, unless) as into:
-            for path in paths:
-                deliver_path(path, site, source or platform.node(), into, done)
+            deliver_paths(paths, site, source or platform.node(), into, done)
     except FlightBeganError as err:
         stopped = str(err)
+    finally:
+        for failure in done.failures:
+            print(f"flightd: {failure}", file=sys.stderr)
     if as_json:
         print(json.dumps(asdict(done) | ({"stopped": stopped} if unless else {})))
     else:
@@ -71,6 +80,8 @@ def deliver(
         if stopped:
             print(stopped)
     done.check_clocks()
+    if done.failures:
+        raise typer.Exit(1)
 
 
 def prune(

@@ -19,6 +19,7 @@ MOST_LOGS = 10_000
 MOST_ENTRIES = 500_000
 DEEPEST = 8
 """Of a larger folder the rest is not looked at."""
+CUT = f"more lies there than the {MOST_LOGS} flight logs, {DEEPEST} folders deep, that are looked at"
 
 _TRUTH = "truth.mcap"
 _LOG_ENDING = ".mcap"
@@ -112,9 +113,10 @@ def beside(log: Path, name: str) -> Path | None:
 
 
 def _files(root: Path) -> Iterator[tuple[str, os.DirEntry[str] | None]]:
-    """Every log's path below `root`; None at last where too much lies there."""
+    """Every log's path below `root`; None at last where too much lies there, or too deep."""
     folders: list[tuple[str, int]] = [("", 0)]
     seen = 0
+    is_cut = False
     while folders:
         below, depth = folders.pop()
         try:
@@ -130,8 +132,12 @@ def _files(root: Path) -> Iterator[tuple[str, os.DirEntry[str] | None]]:
             if entry.is_dir(follow_symlinks=False):
                 if depth < DEEPEST:
                     folders.append((relative, depth + 1))
+                else:
+                    is_cut = True
             elif entry.name.endswith(_LOG_ENDING) and entry.name != _TRUTH and _is_plain(entry):
                 yield relative, entry
+    if is_cut:
+        yield "", None
 
 
 def _is_plain(entry: os.DirEntry[str]) -> bool:

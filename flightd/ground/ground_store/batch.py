@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from flightd.core.errors import InputError
 from flightd.core.inventory import Observation, PlannedLocation, Standing
+from flightd.ground.ground_store.reads_text import printed_text
 
 MOST_LOOKS = 500
 """In one batch."""
@@ -15,6 +16,8 @@ _MOST_NAME_CHARS = 300
 """Of what is looked up by an index: PostgreSQL refuses entries of more than 2,704 bytes."""
 _MOST = 1 << 63
 """Whole numbers are below it, as both databases keep them."""
+MOST_BATCH_BYTES = 4 << 20
+"""Of one batch as JSON; a station takes no more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +111,8 @@ class Batch:
             digest.update(repr(part).encode("utf-8", "surrogatepass"))
         for look in self.looks:
             digest.update(f"{look.observation.id}{look.standing:d}".encode())
+            if look.observation.texts:
+                digest.update(printed_text(look.observation.texts).encode())
         return digest.digest()
 
     def check(self) -> None:

@@ -30,6 +30,10 @@ class BetweenFlights:
         self._check()
         return self.target.standings(looks)
 
+    def printed_texts(self, looks: Sequence[str]) -> dict[str, str]:
+        self._check()
+        return self.target.printed_texts(looks)
+
     def missing_pictures(self, names: Sequence[str]) -> set[str]:
         self._check()
         return self.target.missing_pictures(names)

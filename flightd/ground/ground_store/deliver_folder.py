@@ -1,13 +1,18 @@
-"""Everything that can be delivered of a folder: inventories, flights, and what a station's people decided."""
+"""Everything that can be delivered of folders: inventories, flights, and what a station's people decided.
+
+What cannot be delivered is told, and costs the others nothing.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, UnavailableError
 from flightd.ground.decision_book import FILE as DECISIONS
 from flightd.ground.decision_book import DecisionBook
-from flightd.ground.flights.log_folder import find_logs
+from flightd.ground.flights.log_folder import CUT, find_logs
 from flightd.ground.ground_store.sender import (
     Delivered,
     Target,
@@ -18,35 +23,52 @@ from flightd.ground.ground_store.sender import (
 from flightd.ground.stores import Stores
 
 
-def deliver_path(path: Path, site: str, source: str, target: Target, done: Delivered) -> None:
-    """A folder with all below it, an `inventory.db`, or a flight log.
+def deliver_paths(paths: Sequence[Path], site: str, source: str, target: Target, done: Delivered) -> None:
+    """Each a folder with all below it, an `inventory.db`, or a flight log.
 
-    Each inventory is of the site of the flight log beside it, unless `site` says another.  InputError where
-    neither is known, and for a path with nothing to deliver."""
+    An inventory is of the site that it says itself, else of that of the flight log beside it, unless `site`
+    says another.  What fails, and a path with nothing to deliver, is among the `failures`.  Raises what the
+    store cannot do: it would fail with the next one, too."""
+    for path in paths:
+        with _going_on(path, done):
+            _deliver_path(path, site, source, target, done)
+
+
+def _deliver_path(path: Path, site: str, source: str, target: Target, done: Delivered) -> None:
     root, only = (path, None) if path.is_dir() else (path.parent, path.name)
-    stores = Stores(root)
+    stores = Stores(root, all_of_them=only is None)
     inventories = [name for name, _ in reversed(stores.names())] if only in {None, "inventory.db"} else []
     if only is not None:
         inventories = [name for name in inventories if name == "."]
-    logs = [log for log in find_logs(root).logs if only in {None, log.relative}]
+    found = find_logs(root)
+    logs = [log for log in found.logs if only in {None, log.relative}]
     if not inventories and not logs:
         raise InputError("holds neither an inventory.db nor a flight log", file=path)
+    sites = {name: site or stores.site_name(name) for name in inventories}
     for name in inventories:
-        folder = stores.folder(name)
-        deliver_inventory(folder, _site_of(stores, name, site), source, target, done)
-    deliver_flights(logs, site, source, target, done)
+        with _going_on(stores.folder(name), done):
+            deliver_inventory(stores.folder(name), sites[name], source, target, done)
+    with _going_on(path, done):
+        deliver_flights(logs, site, source, target, done)
+    if found.cut and only is None:
+        done.failures.append(f"{path}: {CUT}; deliver the folders in it one by one")
     if only is None and (root / DECISIONS).is_file():
         book = DecisionBook(root)
         for name in inventories:
-            deliver_decisions(book.decisions(name), _site_of(stores, name, site), source, target, done)
+            if sites[name]:
+                deliver_decisions(book.decisions(name), sites[name], source, target, done)
 
 
-def _site_of(stores: Stores, name: str, given: str) -> str:
-    site = given or stores.site_name(name)
-    if not site:
-        raise InputError(
-            "no flight log beside the inventory says of which site it is",
-            file=stores.folder(name),
-            remedy="add --site NAME",
-        )
-    return site
+@contextmanager
+def _going_on(path: Path, done: Delivered) -> Iterator[None]:
+    """What goes wrong with one is told, and the next one's turn comes."""
+    try:
+        yield
+    except OSError as err:
+        done.failures.append(f"{err.filename or path}: {err.strerror or err}")
+    except InputError as err:
+        done.failures.append(str(err))
+    except UnavailableError as err:
+        if not str(err).startswith(str(path)):
+            raise
+        done.failures.append(str(err))

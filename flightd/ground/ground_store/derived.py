@@ -17,7 +17,7 @@ from flightd.ground.ground_store.events import EventKind, Noted
 from flightd.ground.ground_store.reads_text import texts_of
 from flightd.inventory.count_change import change_between
 
-_COLUMNS = "utc_ns, id, run, state, reads, confidence, evidence, fill, undecided"
+_COLUMNS = "utc_ns, id, run, state, reads, confidence, evidence, fill, undecided, printed"
 _CONFIRMED = f"standing = {Standing.CONFIRMED:d}"
 _COUNTED = f"state IN ({', '.join(repr(state.value) for state in LocationState if state.is_counted)})"
 _NEWEST_FIRST = "ORDER BY utc_ns DESC, id DESC LIMIT 1"
@@ -36,7 +36,7 @@ _NO_RUN = 0
 _NEWEST = f"SELECT {_COLUMNS} FROM observation WHERE place = ? AND {_CONFIRMED} {_NEWEST_FIRST}"
 _STANDS = (
     "UPDATE place SET utc_ns = ?, look = ?, run = ?, state = ?, texts = ?, confidence = ?, evidence = ?,"
-    " fill = ?, undecided = ? WHERE id = ?"
+    " fill = ?, undecided = ?, printed = ? WHERE id = ?"
 )
 _DIFFERS = f"INSERT INTO difference VALUES ({', '.join('?' * 11)})"
 
@@ -54,6 +54,7 @@ class Moment:
     evidence: bytes | None
     fill: str | None
     undecided: str
+    printed: str
 
     @property
     def order(self) -> tuple[int, bytes]:
@@ -95,13 +96,13 @@ class _Written:
     def stand(self, place: int, look: Moment | None) -> None:
         if look is None:
             self.stands.append(
-                (None, None, None, LocationState.NOT_VISITED.value, "[]", None, None, None, "[]", place)
+                (None, None, None, LocationState.NOT_VISITED.value, "[]", None, None, None, "[]", "[]", place)
             )
             return
         self.stands.append(
             (
                 look.utc_ns, look.id, look.run, look.state, json.dumps(texts_of(look.reads)),
-                look.confidence, look.evidence, look.fill, look.undecided, place,
+                look.confidence, look.evidence, look.fill, look.undecided, look.printed, place,
             )
         )  # fmt: skip
 
@@ -175,7 +176,7 @@ def _follows_on(place: Touched, newest: Row | None, written: _Written) -> bool:
         if place.first_ns <= utc_ns or run == now.run or not LocationState(state).is_counted:
             return False
         reads = json.dumps([["", text] for text in json.loads(texts)])
-        before = Moment(utc_ns, identity, run, state, reads, 0.0, None, None, "[]")
+        before = Moment(utc_ns, identity, run, state, reads, 0.0, None, None, "[]", "[]")
     written.stand(place.place, now)
     written.differ(place.code, now.run, now, before)
     return True

@@ -19,11 +19,11 @@ from typing import Any
 
 import msgspec
 
-from flightd.core.errors import FlightdError
+from flightd.core.errors import FlightdError, InputError
 from flightd.ground.access.audit import audit_files
 from flightd.ground.access.people_book import PeopleBook
 from flightd.ground.decision_book import Decision, DecisionBook
-from flightd.ground.flights.log_folder import find_logs
+from flightd.ground.flights.log_folder import CUT, find_logs
 from flightd.ground.ground_store.batch import MOST_LOOKS, Batch, SentLine, SentPerson
 from flightd.ground.ground_store.sender import (
     Delivered,
@@ -59,7 +59,7 @@ class Feeder:
     ) -> None:
         self._store = store
         self._folder = folder
-        self._stores = Stores(folder, others)
+        self._stores = Stores(folder, others, all_of_them=True)
         self._others = others
         self._state = state
         self._source = platform.node()
@@ -109,9 +109,8 @@ class Feeder:
         for name, written_ns in reversed(self._stores.names()):  # what follows on is soonest taken
             site = self._stores.site_name(name)
             decisions = [] if book is None else book.decisions(name)
-            if site:  # else no flight log says yet where it was counted
-                deliver = partial(self._deliver_inventory, name, site, decisions)
-                yield _Part(f"inventory {name}", (written_ns, len(decisions), site), deliver)
+            deliver = partial(self._deliver_inventory, name, site, decisions)
+            yield _Part(f"inventory {name}", (written_ns, len(decisions), site), deliver)
 
     def _deliver_inventory(self, name: str, site: str, decisions: Sequence[Decision]) -> bool:
         done = Delivered()
@@ -122,9 +121,12 @@ class Feeder:
 
     def _flights(self) -> Iterator[_Part]:
         if self._folder is not None:
-            for log in find_logs(self._folder, self._others).logs:
+            found = find_logs(self._folder, self._others)
+            for log in found.logs:
                 deliver = partial(deliver_flights, [log], "", self._source, self._store, Delivered())
                 yield _Part(f"flight {log.shown_path}", log.stamp, deliver)
+            if found.cut:
+                raise InputError(CUT, remedy="flightd store deliver PATH… delivers the others")
 
     def _people(self) -> Iterator[_Part]:
         people = PeopleBook(self._state).people()

@@ -14,7 +14,7 @@ from flightd.ground.ground_store.fill_text import fill_shown
 MOST_ROWS = 1000
 _STOCK = (
     "SELECT place.code, node, state, texts, place.utc_ns, run.name, confidence, evidence, pallets_deep,"
-    " undecided, fill FROM place LEFT JOIN run ON run.id = place.run"
+    " undecided, printed, fill FROM place LEFT JOIN run ON run.id = place.run"
 )
 _DIFFERENCES = (
     "SELECT code, kind, utc_ns, state, texts, run.name, before_ns, before_state, before_texts"
@@ -23,7 +23,7 @@ _DIFFERENCES = (
 _LOOKS = (
     "SELECT observation.utc_ns, observation.id, place.code, run.name, observation.state,"
     " observation.confidence, standing, observation.node, x_m, y_m, height_m, yaw_rad, observation.evidence,"
-    " reads, observation.fill, observation.undecided FROM observation"
+    " reads, observation.fill, observation.undecided, printed, again FROM observation"
     " JOIN place ON place.id = observation.place JOIN run ON run.id = observation.run"
 )
 
@@ -87,7 +87,7 @@ def stock(
         site, *values, after, limit,
     )  # fmt: skip
     names = ("location", "node", "state", "texts", "utc_ns", "run", "confidence", "evidence", "pallets_deep",
-             "undecided")  # fmt: skip
+             "undecided", "printed")  # fmt: skip
     return [{**_document(names, row[:-1]), "fill": fill_shown(row[-1])} for row in rows]
 
 
@@ -187,14 +187,14 @@ def _only(found: list[Row], otherwise: str) -> int:
 def _document(names: tuple[str, ...], row: Row) -> dict[str, Any]:
     document = {}
     for name, value in zip(names, row, strict=True):
-        shown = json.loads(value) if name.endswith(("texts", "undecided")) else value
+        shown = json.loads(value) if name.endswith(("texts", "undecided", "printed")) else value
         document[name] = value.hex() if isinstance(value, bytes) else shown
     return document
 
 
 def _look(row: Row) -> dict[str, Any]:
     utc_ns, identity, code, run, state, confidence, standing, node, x_m, y_m, height_m, yaw_rad, *rest = row
-    evidence, reads, fill, undecided = rest
+    evidence, reads, fill, undecided, printed, again = rest
     return {
         "id": identity.hex(),
         "utc_ns": utc_ns,
@@ -210,7 +210,9 @@ def _look(row: Row) -> dict[str, Any]:
         "fill": fill_shown(fill),
         "reads": [
             {"symbology": s, "text": text, "checksum": bool(sure), "agreeing": n, "quality": q, "gs1": gs1}
-            for s, text, sure, n, q, gs1 in json.loads(reads)
+            for s, text, sure, n, q, gs1, *_ in json.loads(reads)
         ],
         "undecided": json.loads(undecided),
+        "printed": json.loads(printed),
+        "again": bool(again),
     }

@@ -17,7 +17,7 @@ _PART = 10_000
 _LOOKS = (
     "SELECT observation.utc_ns, observation.id, site.name, run.name, place.code, observation.state,"
     " observation.confidence, standing, observation.node, x_m, y_m, height_m, yaw_rad, observation.evidence,"
-    " reads, observation.undecided, observation.fill FROM observation"
+    " reads, observation.undecided, printed, again, observation.fill FROM observation"
     " JOIN place ON place.id = observation.place JOIN run ON run.id = observation.run"
     " JOIN site ON site.id = run.site WHERE observation.run = ?"
     " AND (observation.utc_ns, observation.id) > (?, ?) ORDER BY observation.utc_ns, observation.id LIMIT ?"
@@ -32,8 +32,9 @@ TABLES = {
         "utc": "TIMESTAMP_NS", "id": "VARCHAR", "site": "VARCHAR", "run": "VARCHAR", "location": "VARCHAR",
         "state": "VARCHAR", "confidence": "DOUBLE", "standing": "TINYINT", "node": "VARCHAR", "x_m": "DOUBLE",
         "y_m": "DOUBLE", "height_m": "DOUBLE", "yaw_rad": "DOUBLE", "evidence": "VARCHAR", "reads": "VARCHAR",
-        "undecided": "VARCHAR", "fill_asked": "BOOLEAN", "fill": "DOUBLE", "overhang_m": "DOUBLE",
-        "lean_m": "DOUBLE", "case_columns": "INTEGER", "case_rows": "INTEGER",
+        "undecided": "VARCHAR", "printed": "VARCHAR", "again": "BOOLEAN", "fill_asked": "BOOLEAN",
+        "fill": "DOUBLE", "overhang_m": "DOUBLE", "lean_m": "DOUBLE", "case_columns": "INTEGER",
+        "case_rows": "INTEGER",
     },
     "differences": {
         "utc": "TIMESTAMP_NS", "observation": "VARCHAR", "site": "VARCHAR", "run": "VARCHAR",
@@ -94,7 +95,8 @@ def _rows(engine: Engine, table: str, runs: Sequence[int]) -> Iterator[Row]:
 
 def _with_fill(row: Row) -> Row:
     """A look with a cell for each figure of how full its place is."""
-    *look, fill = row
+    *look, again, fill = row
+    look.append(bool(again))
     told = fill_of(fill)
     if told is None:
         return (*look, False, None, None, None, None, None)

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from flightd.adapters.store.kept_looks import KeptLook
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.inventory import Observation, Standing
+from flightd.core.inventory import Standing
 from flightd.ground.ground_store.batch import MOST_LOOKS
-from flightd.ground.ground_store.sender import Target, missing_pictures
+from flightd.ground.ground_store.sender import Target, lacking, missing_pictures
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,38 +29,37 @@ class Pruned:
 def prune(folder: Path, target: Target) -> Pruned:
     """Ask the store for every look of older runs, and take away what it has as it stands here."""
     with SqliteStore(folder, create=False) as inventory:
-        looks = inventory.looks()
-        newest_run = looks[-1][0].run if looks else ""
-        standing = {record.observation.id for record in inventory.locations() if record.observation}
-        older = [(seen, how) for seen, how in looks if seen.run != newest_run]
-        had = [seen for part in _parts(older) for seen in _had(inventory, part, target)]
-        gone = [seen.id for seen in had if seen.id not in standing]
-        had_ids = {seen.id for seen in had}
-        needed = {seen.evidence for seen, _ in looks if seen.id not in had_ids}
-        pictures = {seen.evidence for seen in had if seen.evidence} - needed
-        inventory.forget(gone)
-        taken_away = sum(_unlinked(inventory.evidence.path(name)) for name in sorted(pictures))
-    return Pruned(len(gone), taken_away, len(older) - len(had))
+        newest_run, standing = inventory.newest_run(), inventory.standing_looks()
+        gone: list[str] = []
+        pictures: set[str] = set()
+        needed: set[str] = set()
+        stay = 0
+        for part in inventory.parts(MOST_LOOKS):
+            older = [look for look in part if look.run != newest_run]
+            had = _had(inventory, older, target)
+            had_ids = {look.id for look in had}
+            stay += len(older) - len(had)
+            gone += [look.id for look in had if look.id not in standing]
+            pictures |= {look.evidence for look in had if look.evidence}
+            needed |= {look.evidence for look in part if look.id not in had_ids}
+        taken_away = sum(_unlinked(inventory.evidence.path(name)) for name in sorted(pictures - needed))
+        for begin in range(0, len(gone), MOST_LOOKS):
+            inventory.forget(gone[begin : begin + MOST_LOOKS])
+    return Pruned(len(gone), taken_away, stay)
 
 
-def _had(
-    inventory: SqliteStore, part: Sequence[tuple[Observation, Standing]], target: Target
-) -> list[Observation]:
-    """Those that the store has, for good, with the pictures that are here."""
-    kept = target.standings([seen.id for seen, _ in part])
-    names = {seen.evidence for seen, _ in part if seen.evidence}
+def _had(inventory: SqliteStore, older: Sequence[KeptLook], target: Target) -> list[KeptLook]:
+    """Those that the store has, for good, with what was found printed and the pictures that are here."""
+    if not older:
+        return []
+    lacked = {look.id for look in lacking(older, target)}
+    names = {look.evidence for look in older if look.evidence}
     missing = {name for name in missing_pictures(names, target) if inventory.evidence.path(name).exists()}
     return [
-        seen
-        for seen, how in part
-        if how is not Standing.PENDING and kept.get(seen.id, -1) >= how and seen.evidence not in missing
+        look
+        for look in older
+        if look.standing is not Standing.PENDING and look.id not in lacked and look.evidence not in missing
     ]
-
-
-def _parts(
-    looks: Sequence[tuple[Observation, Standing]],
-) -> list[Sequence[tuple[Observation, Standing]]]:
-    return [looks[begin : begin + MOST_LOOKS] for begin in range(0, len(looks), MOST_LOOKS)]
 
 
 def _unlinked(path: Path) -> bool:

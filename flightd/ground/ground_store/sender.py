@@ -6,18 +6,21 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+import msgspec
+
 from flightd.adapters.store.for_reading import opened_for_reading
+from flightd.adapters.store.kept_looks import KeptLook
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError
-from flightd.core.inventory import Observation, PlannedLocation
 from flightd.ground.decision_book import Decision
 from flightd.ground.flights.flight_row import FlightRow, read_rows
 from flightd.ground.flights.log_folder import FoundLog, path_of
 from flightd.ground.ground_store.batch import (
+    MOST_BATCH_BYTES,
     MOST_LOOKS,
     Batch,
     Receipt,
@@ -25,7 +28,10 @@ from flightd.ground.ground_store.batch import (
     SentFlight,
     SentLook,
 )
+from flightd.ground.ground_store.reads_text import NOTHING_PRINTED, printed_text, says_more
 
+_AROUND_BYTES = 1 << 16
+"""Of a batch, what is not its items."""
 _BEGINNING = 1 << 16
 """Bytes of a log by which its flight is known: time, drone, map and configuration stand there."""
 _ASKED_AT_ONCE = 50
@@ -39,6 +45,10 @@ class Target(Protocol):
 
     def standings(self, looks: Sequence[str]) -> dict[str, int]:
         """As `GroundStore.standings`."""
+        ...
+
+    def printed_texts(self, looks: Sequence[str]) -> dict[str, str]:
+        """As `GroundStore.printed_texts`."""
         ...
 
     def missing_pictures(self, names: Sequence[str]) -> set[str]:
@@ -61,13 +71,15 @@ class Delivered:
     looks: int = 0
     """New in the store."""
     changed: int = 0
-    """Confirmed or withdrawn since."""
+    """Confirmed or withdrawn since, or more was found printed."""
     already: int = 0
     pictures: int = 0
     flights: int = 0
     decisions: int = 0
     ahead: int = 0
     """Left where they are: of a time that has not come yet where the store is."""
+    failures: list[str] = field(default_factory=list)
+    """What could not be delivered, a line for each."""
 
     def add(self, receipt: Receipt) -> None:
         self.looks += receipt.new
@@ -85,28 +97,43 @@ class Delivered:
 
 
 def deliver_inventory(folder: Path, site: str, source: str, target: Target, done: Delivered) -> None:
-    """All looks of an inventory, with their pictures; each batch is in the store before the next is sent."""
+    """All looks of an inventory, with their pictures; each batch is in the store before the next is sent.
+    InputError where no `site` is known."""
+    if not site:
+        raise InputError(
+            "nothing says of which site the inventory is",
+            file=folder,
+            remedy="deliver it with --site NAME, or FLIGHTD_SITE",
+        )
     with opened_for_reading(folder, untouched=True) as inventory:
-        records = inventory.locations()
-        planned_ns = max((record.observation.utc_ns for record in records if record.observation), default=0)
-        planned = [PlannedLocation(record.code, record.node, record.pallets_deep) for record in records]
-        looks = inventory.looks()
-        for places in _parts(planned):
+        planned_ns = inventory.newest_ns()
+        for places in _parts(inventory.planned()):
             target.take(Batch(site, source, places=tuple(places), planned_ns=planned_ns))
-        for part in _parts(looks):
-            kept = target.standings([seen.id for seen, _ in part])
-            missing = [
-                SentLook(seen, standing) for seen, standing in part if standing > kept.get(seen.id, -1)
-            ]
+        for part in inventory.parts(MOST_LOOKS):
+            missing = lacking(part, target)
             done.already += len(part) - len(missing)
-            if missing:
-                done.pictures += _keep_pictures(inventory, [look.observation for look in missing], target)
-                done.add(target.take(Batch(site, source, looks=tuple(missing))))
+            done.pictures += _keep_pictures(inventory, missing, target)
+            for looks in _parts([SentLook(*look) for look in inventory.loaded(missing)]):
+                done.add(target.take(Batch(site, source, looks=tuple(looks))))
 
 
-def _keep_pictures(inventory: SqliteStore, looks: Sequence[Observation], target: Target) -> int:
+def lacking(looks: Sequence[KeptLook], target: Target) -> list[KeptLook]:
+    """Those that the store has not, or not with the standing or not with the printed text that they have
+    here."""
+    kept = target.standings([look.id for look in looks])
+    told = [look.id for look in looks if look.texts]
+    printed = target.printed_texts(told) if told else {}
+    return [
+        look
+        for look in looks
+        if look.standing > kept.get(look.id, -1)
+        or says_more(printed_text(look.texts), printed.get(look.id, NOTHING_PRINTED))
+    ]
+
+
+def _keep_pictures(inventory: SqliteStore, looks: Sequence[KeptLook], target: Target) -> int:
     """Before the looks that name them; a picture that the sender has no longer is not waited for."""
-    names = {seen.evidence for seen in looks if seen.evidence}
+    names = {look.evidence for look in looks if look.evidence}
     sent = 0
     for name in missing_pictures(names, target):
         path = inventory.evidence.path(name)
@@ -166,6 +193,16 @@ def deliver_decisions(
         done.decisions += len(part)
 
 
-def _parts(items: Sequence[_T]) -> Iterator[Sequence[_T]]:
-    for begin in range(0, len(items), MOST_LOOKS):
-        yield items[begin : begin + MOST_LOOKS]
+def _parts(items: Iterable[_T]) -> Iterator[list[_T]]:
+    """As many as fit into one batch, by their number and their size."""
+    part: list[_T] = []
+    size = 0
+    for item in items:
+        item_bytes = len(msgspec.json.encode(item)) + 1
+        if part and (len(part) >= MOST_LOOKS or size + item_bytes > MOST_BATCH_BYTES - _AROUND_BYTES):
+            yield part
+            part, size = [], 0
+        part.append(item)
+        size += item_bytes
+    if part:
+        yield part

@@ -22,7 +22,8 @@ _T = TypeVar("_T")
 class StationTarget:
     """A `Target` at `https://HOST:PORT`; certificates are checked as the system has it.
 
-    UnavailableError where the station cannot be had, InputError for what it refuses."""
+    UnavailableError where the station, or with this key its store, cannot be had, InputError for what it
+    refuses of what is sent."""
 
     def __init__(self, url: str, key: str) -> None:
         """InputError for an address that would send the key in the open, and without a key."""
@@ -38,6 +39,9 @@ class StationTarget:
 
     def standings(self, looks: Sequence[str]) -> dict[str, int]:
         return self._ask("/standings", msgspec.json.encode({"names": looks}), dict[str, int])
+
+    def printed_texts(self, looks: Sequence[str]) -> dict[str, str]:
+        return self._ask("/printed-texts", msgspec.json.encode({"names": looks}), dict[str, str])
 
     def missing_pictures(self, names: Sequence[str]) -> set[str]:
         return self._ask("/missing-pictures", msgspec.json.encode({"names": names}), set[str])
@@ -59,7 +63,7 @@ class StationTarget:
                 return msgspec.json.decode(answer.read(_MOST_ANSWER_BYTES), type=kind)
         except urllib.error.HTTPError as err:
             why = _refusal(err)
-            refused = UnavailableError if err.code >= 500 else InputError
+            refused = UnavailableError if err.code in {401, 403} or err.code >= 500 else InputError
             raise refused(f"the station answers: {why}", file=self.shown) from None
         except (OSError, http.client.HTTPException) as err:
             raise UnavailableError(f"the station cannot be had: {way_lost(err)}", file=self.shown) from None

@@ -23,6 +23,7 @@ from flightd.ground.ground_store.outbox import Outbox, OutgoingFile
 from flightd.ground.ground_store.pages import MOST_ROWS, Mark
 from flightd.ground.ground_store.parquet import export
 from flightd.ground.ground_store.questions import Question
+from flightd.ground.ground_store.reads_text import NOTHING_PRINTED
 from flightd.ground.ground_store.take_batch import Taken, take_batch
 
 MOST_AHEAD_NS = 1_800_000_000_000
@@ -91,6 +92,15 @@ class GroundStore:
             for marks, part in listed([bytes.fromhex(look) for look in looks]):
                 rows = session.rows(f"SELECT id, standing FROM observation WHERE id IN {marks}", *part)
                 kept |= {identity.hex(): standing for identity, standing in rows}
+        return kept
+
+    def printed_texts(self, looks: Sequence[str]) -> dict[str, str]:
+        """Of these looks by id, those of which something printed is kept, each as `printed_text` has it."""
+        kept: dict[str, str] = {}
+        with self._engine.reading() as session:
+            for marks, part in listed([bytes.fromhex(look) for look in looks]):
+                rows = session.rows(f"SELECT id, printed FROM observation WHERE id IN {marks}", *part)
+                kept |= {identity.hex(): text for identity, text in rows if text != NOTHING_PRINTED}
         return kept
 
     def missing_pictures(self, names: Sequence[str]) -> set[str]:

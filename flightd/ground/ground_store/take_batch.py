@@ -1,4 +1,6 @@
-"""A batch taken into the tables: what is there already stays, a look's standing only rises."""
+"""A batch taken into the tables: what is there already stays, a look's standing only rises, and what was
+found printed only grows.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +13,9 @@ from flightd.ground.ground_store.derived import Moment, Touched, renew
 from flightd.ground.ground_store.engine import Engine, Session, listed
 from flightd.ground.ground_store.events import EventKind, Noted
 from flightd.ground.ground_store.fill_text import fill_text
-from flightd.ground.ground_store.reads_text import reads_text, undecided_text
+from flightd.ground.ground_store.reads_text import printed_text, reads_text, says_more, undecided_text
 
-_LOOK = f"INSERT INTO observation VALUES ({', '.join('?' * 16)}) ON CONFLICT DO NOTHING"
+_LOOK = f"INSERT INTO observation VALUES ({', '.join('?' * 18)}) ON CONFLICT DO NOTHING"
 _TOLD = {
     "mission": "''", "outcome": "''", "verdict": "''",
     "duration_s": "NULL", "nodes_planned": "NULL", "nodes_visited": "NULL",
@@ -49,7 +51,7 @@ _PERSON = (
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """How many looks were new, and how many stand otherwise now."""
+    """How many looks were new, and how many stand otherwise now, or tell more of what is printed."""
 
     new: int = 0
     changed: int = 0
@@ -114,9 +116,16 @@ def _take_looks(engine: Engine, session: Session, site: int, batch: Batch, noted
             unique[look.observation.id] = look
     kept = _kept(session, unique.values())
     new = [look for identity, look in unique.items() if bytes.fromhex(identity) not in kept]
-    risen = [
-        look for identity, look in unique.items() if look.standing > kept.get(bytes.fromhex(identity), 99)
-    ]
+    risen, fuller = [], []
+    printed = {identity: printed_text(look.observation.texts) for identity, look in unique.items()}
+    for identity, look in unique.items():
+        standing, known = kept.get(bytes.fromhex(identity), (Standing.WITHDRAWN, printed[identity]))
+        if look.standing > standing:
+            risen.append(look)
+        if says_more(printed[identity], known):
+            fuller.append(look.observation)
+        else:
+            printed[identity] = known
     runs = _runs(session, site, [look.observation for look in new], noted)
     engine.make_room(session, {look.observation.utc_ns for look in new})
     session.run_many(_LOOK, [_row(look, places, runs) for look in new])
@@ -124,9 +133,17 @@ def _take_looks(engine: Engine, session: Session, site: int, batch: Batch, noted
         "UPDATE observation SET standing = ? WHERE id = ? AND utc_ns = ?",
         [(int(look.standing), bytes.fromhex(look.observation.id), look.observation.utc_ns) for look in risen],
     )
+    session.run_many(
+        "UPDATE observation SET printed = ? WHERE id = ? AND utc_ns = ?",
+        [(printed[seen.id], bytes.fromhex(seen.id), seen.utc_ns) for seen in fuller],
+    )
+    session.run_many(
+        "UPDATE place SET printed = ? WHERE id = ? AND look = ?",
+        [(printed[seen.id], places[seen.location], bytes.fromhex(seen.id)) for seen in fuller],
+    )
     runs |= _run_ids(session, site, {look.observation.run for look in risen})
-    renew(session, _touched([*new, *risen], places, runs), noted)
-    return Taken(len(new), len(risen))
+    renew(session, _touched([*new, *risen], places, runs, printed), noted)
+    return Taken(len(new), len({look.observation.id for look in risen} | {seen.id for seen in fuller}))
 
 
 def _follow_plan(session: Session, places: dict[str, int], batch: Batch) -> None:
@@ -168,19 +185,19 @@ def _place_ids(session: Session, site: int, codes: Sequence[str]) -> dict[str, i
     return found
 
 
-def _kept(session: Session, looks: Iterable[SentLook]) -> dict[bytes, int]:
-    """Those that the store has already, with their standing there."""
+def _kept(session: Session, looks: Iterable[SentLook]) -> dict[bytes, tuple[int, str]]:
+    """Those that the store has already, with their standing there, and what was found printed."""
     sent = list(looks)
     times = [look.observation.utc_ns for look in sent]
-    kept: dict[bytes, int] = {}
+    kept: dict[bytes, tuple[int, str]] = {}
     for marks, part in listed([bytes.fromhex(look.observation.id) for look in sent]):
         rows = session.rows(
-            f"SELECT id, standing FROM observation WHERE id IN {marks} AND utc_ns BETWEEN ? AND ?",
+            f"SELECT id, standing, printed FROM observation WHERE id IN {marks} AND utc_ns BETWEEN ? AND ?",
             *part,
             min(times),
             max(times),
         )
-        kept.update(rows)
+        kept |= {identity: (standing, printed) for identity, standing, printed in rows}
     return kept
 
 
@@ -225,10 +242,13 @@ def _row(look: SentLook, places: dict[str, int], runs: dict[str, int]) -> tuple[
         bytes.fromhex(seen.id), seen.utc_ns, places[seen.location], runs[seen.run], seen.state.value,
         float(seen.confidence), int(look.standing), *where, bytes.fromhex(seen.evidence) or None,
         reads_text(seen.reads), fill_text(seen.fill), undecided_text(seen.undecided),
+        printed_text(seen.texts), int(seen.again),
     )  # fmt: skip
 
 
-def _touched(looks: Sequence[SentLook], places: dict[str, int], runs: dict[str, int]) -> list[Touched]:
+def _touched(
+    looks: Sequence[SentLook], places: dict[str, int], runs: dict[str, int], printed: dict[str, str]
+) -> list[Touched]:
     """The places at which something counts that did not, or no longer."""
     found: dict[int, Touched] = {}
     for look in looks:
@@ -240,7 +260,7 @@ def _touched(looks: Sequence[SentLook], places: dict[str, int], runs: dict[str, 
                 Moment(
                     seen.utc_ns, bytes.fromhex(seen.id), runs[seen.run], seen.state.value,
                     reads_text(seen.reads), seen.confidence, bytes.fromhex(seen.evidence) or None,
-                    fill_text(seen.fill), undecided_text(seen.undecided),
+                    fill_text(seen.fill), undecided_text(seen.undecided), printed[seen.id],
                 ),
                 counts=look.standing is Standing.CONFIRMED,
             )  # fmt: skip

@@ -47,7 +47,7 @@ _AFTER_MARK = Parameter("after", "mark", "`next` of the page before.")
 _LOOK_FIELDS = {
     "id": "string", "utc": "time", "location": "string", "run": "string", "state": "state",
     "confidence": "number", "standing": "string", "pose": "object?", "evidence": "string?", "fill": "fill?",
-    "reads": "array", "undecided": "array",
+    "reads": "array", "undecided": "array", "printed": "array", "again": "boolean",
 }  # fmt: skip
 
 ENDPOINTS: Sequence[Endpoint] = (
@@ -60,7 +60,7 @@ ENDPOINTS: Sequence[Endpoint] = (
         {
             "location": "string", "node": "string", "state": "state", "texts": "texts", "utc": "time?",
             "run": "string?", "confidence": "number?", "evidence": "string?", "pallets_deep": "number",
-            "fill": "fill?", "undecided": "array",
+            "fill": "fill?", "undecided": "array", "printed": "array",
         },
         "location",
     ),

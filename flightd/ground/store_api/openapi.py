@@ -12,6 +12,7 @@ _KINDS: dict[str, dict[str, Any]] = {
     "string": {"type": "string"},
     "number": {"type": "number"},
     "integer": {"type": "integer"},
+    "boolean": {"type": "boolean"},
     "object": {"type": "object"},
     "array": {"type": "array", "items": {"type": "object"}},
     "texts": {"type": "array", "items": {"type": "string"}},

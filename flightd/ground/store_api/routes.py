@@ -15,7 +15,7 @@ from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
 from flightd.core.utc_time import utc_text
 from flightd.ground.bounded import Threads
-from flightd.ground.ground_store.batch import Batch
+from flightd.ground.ground_store.batch import MOST_BATCH_BYTES, Batch
 from flightd.ground.ground_store.pages import Mark
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.json_http import AnswerTo, as_json, json_body, or_refused, refusal, said
@@ -24,7 +24,6 @@ from flightd.ground.store_api.openapi import document
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES
 
 PREFIX = "/api/v1"
-MOST_BATCH_BYTES = 4 << 20
 _AT_ONCE, _MOST_WAITING = 3, 32
 _MOST_CHARS = 200
 _Names = Annotated[list[Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]], Meta(max_length=1000)]
@@ -65,6 +64,10 @@ def _delivery_routes(store: GroundStore, threads: Threads) -> list[BaseRoute]:
         asked = await said(request, Asked, "a question about looks", MOST_BATCH_BYTES)
         return as_json(await threads.run(store.standings, asked.names))
 
+    async def printed(request: Request) -> Response:
+        asked = await said(request, Asked, "a question about looks", MOST_BATCH_BYTES)
+        return as_json(await threads.run(store.printed_texts, asked.names))
+
     async def missing(request: Request) -> Response:
         asked = await said(request, Asked, "a question about pictures", MOST_BATCH_BYTES)
         return as_json(sorted(await threads.run(store.missing_pictures, asked.names)))
@@ -80,7 +83,8 @@ def _delivery_routes(store: GroundStore, threads: Threads) -> list[BaseRoute]:
         return as_json(await threads.run(store.take, batch))
 
     ways: dict[str, AnswerTo] = {
-        "": take, "/standings": standings, "/missing-pictures": missing, "/pictures": keep,
+        "": take, "/standings": standings, "/printed-texts": printed, "/missing-pictures": missing,
+        "/pictures": keep,
     }  # fmt: skip
     return [
         Route(f"{PREFIX}/deliveries{way}", or_refused(answer), methods=["POST"])

@@ -13,18 +13,23 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import psycopg
 import pytest
 
+from flightd.adapters.store.kept_looks import KeptLook
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationState, Observation, PlannedLocation, Standing
+from flightd.core.label_values import LabelValue, ValueKind, ValueSource
 from flightd.core.types import CodeRead
+from flightd.ground import stores
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
+from flightd.ground.flights import log_folder
 from flightd.ground.ground_store import sender
-from flightd.ground.ground_store.batch import Batch, Receipt
+from flightd.ground.ground_store.batch import MOST_BATCH_BYTES, Batch, Receipt
 from flightd.ground.ground_store.between_flights import BetweenFlights, FlightBeganError
-from flightd.ground.ground_store.deliver_folder import deliver_path
+from flightd.ground.ground_store.deliver_folder import deliver_paths
 from flightd.ground.ground_store.engine import Engine, Row, Session
 from flightd.ground.ground_store.evidence import Evidence, FolderEvidence
 from flightd.ground.ground_store.postgres_engine import PostgresSession
@@ -214,8 +219,9 @@ def test_a_folder_is_delivered_with_flights_and_decisions(
     decision = Decision("decision-1", "AL-01-1-1", 5, 4, Decided.PUT_RIGHT, "ann", "torn")
     DecisionBook(folder).add("monday", decision)
     done = Delivered()
-    deliver_path(folder, "", "station", store, done)
+    deliver_paths([folder], "", "station", store, done)
     assert (done.looks, done.pictures, done.flights, done.decisions) == (10, 1, 1, 1)
+    assert done.failures == []
     assert [row["who"] for row in store.decisions(RACKS.name, "AL-01-1-1")] == ["ann"]
     flown = [flight for site in store.sites() for flight in store.flights(site["site"])]
     assert [flight["outcome"] for flight in flown] == ["completed"]
@@ -225,13 +231,146 @@ def test_a_folder_is_delivered_with_flights_and_decisions(
 
 def test_an_inventory_of_no_known_site_is_refused(store: GroundStore, tmp_path: Path) -> None:
     counted_store(tmp_path / "monday")
-    with pytest.raises(InputError, match=r"monday: no flight log beside .*; add --site NAME$"):
-        deliver_path(tmp_path / "monday" / "inventory.db", "", "station", store, Delivered())
-    deliver_path(tmp_path / "monday", SITE, "station", store, Delivered())
-    assert store.counts()["looks"] == 10
     (tmp_path / "empty").mkdir()
-    with pytest.raises(InputError, match=r"neither an inventory\.db nor a flight log"):
-        deliver_path(tmp_path / "empty", SITE, "station", store, Delivered())
+    done = Delivered()
+    deliver_paths(
+        [tmp_path / "monday" / "inventory.db", tmp_path / "empty"], "", "station", store, done
+    )
+    assert done.failures == [
+        f"{tmp_path}/monday: nothing says of which site the inventory is; deliver it with --site NAME, or"
+        " FLIGHTD_SITE",
+        f"{tmp_path}/empty: holds neither an inventory.db nor a flight log",
+    ]
+    assert store.counts()["looks"] == 0
+    deliver_paths([tmp_path / "monday"], SITE, "station", store, Delivered())
+    assert store.counts()["looks"] == 10
+
+
+def test_an_inventory_says_itself_of_which_site_it_is(store: GroundStore, tmp_path: Path) -> None:
+    counted_store(tmp_path / "monday")
+    flown_log(tmp_path / "monday" / "flight.mcap", RACKS)
+    with SqliteStore(tmp_path / "monday") as inventory:
+        inventory.plan([], SITE)
+    deliver_paths([tmp_path], "", "drone", store, Delivered())
+    assert [site["site"] for site in store.sites()] == [SITE]
+
+
+def test_one_inventory_that_cannot_be_delivered_keeps_no_other_back(flightd: Command, tmp_path: Path) -> None:
+    for day in ("monday", "tuesday", "wednesday", "thursday"):
+        counted_store(tmp_path / day)
+        with SqliteStore(tmp_path / day) as inventory:
+            inventory.plan([PlannedLocation(day, "A1")], SITE)
+    (tmp_path / "tuesday" / "inventory.db").write_bytes(b"no database at all, but long enough " * 50)
+    file = tmp_path / "wednesday" / "inventory.db"
+    whole = file.read_bytes()
+    file.write_bytes(whole[:16384] + b"\xff" * (len(whole) - 16384))
+    ended = flightd("store", "deliver", tmp_path, "--store", tmp_path / "counts.db", "--site", SITE)
+    assert ended.returncode == 1
+    assert ended.stdout.startswith("10 looks delivered")
+    told = sorted(ended.stderr.splitlines())
+    assert [line.partition("inventory.db")[0] for line in told] == [
+        f"flightd: {tmp_path}/tuesday/",
+        f"flightd: {tmp_path}/wednesday/",
+    ]
+    with GroundStore(_engine_at(str(tmp_path / "counts.db")), FolderEvidence(tmp_path / "e")) as store:
+        assert {"monday", "thursday"} <= {row["location"] for row in store.stock(SITE)}
+
+
+def test_however_many_folders_there_are_each_inventory_is_delivered(
+    store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stores, "_MOST_STORES", 2)
+    monkeypatch.setattr(stores, "_MOST_FOLDERS", 3)
+    deep = tmp_path / "a" / "b" / "c" / "d" / "e"
+    for number, folder in enumerate([*(tmp_path / f"hall {n}" for n in range(4)), deep]):
+        with SqliteStore(folder) as inventory:
+            inventory.plan([], SITE)
+            inventory.commit(seen(number))
+    monkeypatch.setattr(log_folder, "MOST_LOGS", 1)
+    for name in ("one", "two"):
+        flown_log(tmp_path / f"{name}.mcap", RACKS)
+    done = Delivered()
+    deliver_paths([tmp_path], "", "station", store, done)
+    assert done.looks == 5
+    assert done.failures == [f"{tmp_path}: {log_folder.CUT}; deliver the folders in it one by one"]
+
+
+def test_a_batch_is_never_larger_than_a_station_takes(
+    store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for number in range(300):
+            read = CodeRead("QR Code", f"{number}" + "x" * 30_000, (), True, 3, 1.0)
+            inventory.commit(replace(seen(1), utc_ns=_BEGIN + number, reads=(read,)))
+    sizes = []
+    take = store.take
+
+    def taken(batch: Batch) -> Receipt:
+        sizes.append(len(msgspec.json.encode(batch)))
+        return take(batch)
+
+    monkeypatch.setattr(store, "take", taken)
+    done = Delivered()
+    deliver_inventory(tmp_path / "inventory", SITE, "north", store, done)
+    assert done.looks == 300
+    assert MOST_BATCH_BYTES / 2 < max(sizes) <= MOST_BATCH_BYTES
+
+
+def test_looks_are_loaded_a_batch_at_a_time_and_those_that_the_store_has_not_at_all(
+    store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sender, "MOST_LOOKS", 10)
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for number in range(35):
+            inventory.commit(seen(number))
+    loaded: list[int] = []
+    load = SqliteStore.loaded
+
+    def told(inventory: SqliteStore, looks: Sequence[KeptLook]) -> list[tuple[Observation, Standing]]:
+        loaded.append(len(looks))
+        return load(inventory, looks)
+
+    monkeypatch.setattr(SqliteStore, "loaded", told)
+    for name in ("looks", "locations"):  # all at once
+        monkeypatch.delattr(SqliteStore, name)
+    for batches in ([10, 10, 10, 5], [0, 0, 0, 0]):
+        loaded.clear()
+        deliver_inventory(tmp_path / "inventory", SITE, "north", store, Delivered())
+        assert loaded == batches
+    loaded.clear()
+    assert prune(tmp_path / "inventory", store).looks == 25
+    assert loaded == []
+
+
+def test_what_is_found_printed_later_is_delivered_and_until_then_not_pruned(
+    store: GroundStore, tmp_path: Path
+) -> None:
+    lot = LabelValue(ValueKind.LOT, "B-4711", "", ValueSource.TEXT, 0.95)
+    best = LabelValue(ValueKind.BEST_BEFORE, "2027-01-31", "", ValueSource.TEXT, 0.99)
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for number in (1, 11, 21):
+            inventory.commit(seen(number))
+        inventory.keep_texts(seen(21).id, [lot], "first")
+        deliver_inventory(inventory.folder, SITE, "north", store, Delivered())
+        inventory.keep_texts(seen(1).id, [lot, best], "first")
+        pruned = prune(inventory.folder, store)
+        assert (pruned.looks, pruned.stay) == (1, 1)
+        done = Delivered()
+        deliver_inventory(inventory.folder, SITE, "north", store, done)
+        assert (done.looks, done.changed, done.already) == (0, 1, 1)
+        again = Delivered()
+        deliver_inventory(inventory.folder, SITE, "north", store, again)
+        assert (again.changed, again.already) == (0, 2)
+        assert prune(inventory.folder, store).looks == 1
+        assert [look.id for look, _ in inventory.looks()] == [seen(21).id]
+    told = {row["id"]: row["printed"] for row in store.history(SITE, "A-1")}
+    assert store.stock(SITE)[0]["printed"] == told[seen(21).id]
+    lot_told = {"kind": "lot", "value": "B-4711", "confidence": 0.95}
+    assert told == {
+        seen(1).id: [lot_told, {"kind": "best_before", "value": "2027-01-31", "confidence": 0.99}],
+        seen(11).id: [],
+        seen(21).id: [lot_told],
+    }
 
 
 def test_a_flight_that_begins_stops_a_delivery_and_the_rest_comes_after_it(

@@ -25,6 +25,7 @@ from flightd.core.inventory import (
     Standing,
     UndecidedCode,
 )
+from flightd.core.label_values import LabelValue, ValueKind, ValueSource
 from flightd.core.types import CodeRead
 from flightd.ground.ground_store import derived, migrations, postgres_engine
 from flightd.ground.ground_store.batch import Batch, SentDecision, SentFlight, SentLine, SentLook, SentPerson
@@ -33,6 +34,7 @@ from flightd.ground.ground_store.evidence import FolderEvidence
 from flightd.ground.ground_store.migrations import newest_version
 from flightd.ground.ground_store.pages import Mark
 from flightd.ground.ground_store.postgres_engine import PostgresEngine, PostgresSession
+from flightd.ground.ground_store.reads_text import reads_of, reads_text
 from flightd.ground.ground_store.sqlite_engine import SqliteEngine
 from flightd.ground.ground_store.store import GroundStore
 
@@ -121,6 +123,38 @@ def test_how_full_a_place_is_stands_with_its_look_and_its_place(store: GroundSto
     assert [row["fill"] for row in store.history(SITE, "A-1")] == [*reversed(fills.values())]
     store.take(batch(look("A-1", "PAL-1", run="run 2", at_ns=_BEGIN + 2 * _DAY, standing=Standing.WITHDRAWN)))
     assert store.stock(SITE)[0]["fill"] == fills[PlaceFill(None)]
+
+
+def test_what_is_printed_grows_with_its_look_and_stands_with_its_place(store: GroundStore) -> None:
+    values = [LabelValue(ValueKind.LOT, lot, "", ValueSource.TEXT, 0.95) for lot in ("B1", "B\N{SNOWMAN}2\0")]
+    none, one, two = (
+        replace(look("A-1", "PAL-1").observation, texts=tuple(values[:count])) for count in range(3)
+    )
+
+    def printed() -> list[list[str]]:
+        (place,), (row,) = store.stock(SITE), store.history(SITE, "A-1")
+        return [[told["value"] for told in of["printed"]] for of in (place, row)]
+
+    store.take(batch(SentLook(one, Standing.PENDING)))
+    assert printed() == [[], ["B1"]]
+    taken = store.take(batch(SentLook(none, Standing.CONFIRMED)))
+    assert (taken.changed, printed()) == (1, [["B1"], ["B1"]])
+    taken = store.take(batch(SentLook(two, Standing.PENDING)))
+    assert (taken.changed, printed()) == (1, [["B1", "B\N{SNOWMAN}2\0"]] * 2)
+    taken = store.take(batch(SentLook(one, Standing.CONFIRMED)))
+    assert (taken.changed, printed()) == (0, [["B1", "B\N{SNOWMAN}2\0"]] * 2)
+    assert store.take(batch(SentLook(two, Standing.WITHDRAWN))).changed == 1
+    assert printed()[0] == []
+    assert list(store.printed_texts([two.id, look("A-2").observation.id])) == [two.id]
+
+
+def test_that_a_look_was_a_second_one_and_how_small_its_codes_were_is_kept(store: GroundStore) -> None:
+    seen = look("A-1", "PAL-1").observation
+    small = replace(seen.reads[0], module_px=1.75)
+    store.take(batch(SentLook(replace(seen, again=True, reads=(small,)), Standing.CONFIRMED)))
+    (row,) = store.history(SITE, "A-1")
+    assert (row["again"], row["reads"][0]["text"]) == (True, "PAL-1")
+    assert reads_of(reads_text((small,))) == (small,)
 
 
 def test_what_stayed_undecided_stands_with_its_look_and_its_place_and_is_no_code(store: GroundStore) -> None:
@@ -577,6 +611,7 @@ def test_duckdb_reads_what_is_exported(store: GroundStore, tmp_path: Path) -> No
     assert [json.loads(row[0]) for row in doubts] == [
         [], [], [{"symbology": "ITF", "text": 'a"b,\n', "looks": 2}], [],
     ]  # fmt: skip
+    assert _asked(f"SELECT DISTINCT printed, again FROM '{observations}'") == [("[]", False)]
     filled = _asked(
         "SELECT fill_asked, fill, overhang_m, lean_m, case_columns, case_rows"
         f" FROM '{observations}' ORDER BY utc, location"

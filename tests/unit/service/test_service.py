@@ -10,12 +10,18 @@ import shutil
 import socket
 import subprocess
 import sys
+from contextlib import ExitStack
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from flightd.adapters.recorder.archive import FlightArchive
 from flightd.app.armed_mark import ArmedMark
+from flightd.app.counting.flight_count import FlightCount
 from flightd.app.service import note_start, was_started_before
+from flightd.config.schema import load_config
+from flightd.ground.ground_store.open_store import opened_store
 from tests.command import Command
 from tests.web.stock_rig import RACKS, counted_store, flown_log
 
@@ -129,8 +135,7 @@ def test_a_delivery_yields_to_everything_and_waits_for_its_file() -> None:
 
 
 def test_the_units_words_deliver_and_prune_but_not_while_the_daemon_is_armed(tmp_path: Path) -> None:
-    counted_store(tmp_path / "drone" / "inventory")
-    flown_log(tmp_path / "drone" / "inventory" / "flight.mcap", RACKS)
+    daemons_folder(tmp_path / "drone")
     mark = mark_of(tmp_path)
     program = tmp_path / "program"
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -m flightd "$@"\n')
@@ -160,9 +165,22 @@ def test_the_units_words_deliver_and_prune_but_not_while_the_daemon_is_armed(tmp
     mark.unlink()
     (line,) = run()
     assert line.startswith("10 looks delivered")
+    with opened_store(str(tmp_path / "counts.db")) as store:
+        assert [site["site"] for site in store.sites()] == [RACKS.name]
     line, pruned = run(FLIGHTD_PRUNE=str(tmp_path / "drone" / "inventory"))
     assert line.startswith("0 looks delivered")
     assert pruned.endswith("pictures taken away")
+
+
+def daemons_folder(folder: Path) -> None:
+    """/var/lib/flightd after a flight that counted, as the daemon leaves it."""
+    config = load_config(SYSTEMD.parent / "configs" / "sim.toml")
+    camera = config.front_camera.model_copy(update={"url": "udp://127.0.0.1:1"})
+    with ExitStack() as flight:
+        counting = config.model_copy(update={"front_camera": camera})
+        assert FlightCount(counting, RACKS, folder / "inventory", flight, run="1").scans
+    counted_store(folder / "inventory")
+    flown_log(FlightArchive(folder / "flights", 1 << 30).begin(datetime(2026, 11, 29, tzinfo=UTC)), RACKS)
 
 
 def mark_of(folder: Path) -> Path:

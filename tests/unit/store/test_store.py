@@ -59,6 +59,31 @@ def test_how_deep_places_are_follows_the_newest_plan_and_is_merged(tmp_path: Pat
             assert [(r.pallets_deep, r.pallets_seen) for r in one.locations()] == [(3, 1), (1, 0)]
 
 
+def test_of_which_site_it_is_follows_the_newest_plan_and_is_merged(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path / "one") as store, SqliteStore(tmp_path / "two") as other:
+        assert store.site == ""
+        for site in ("hall 2", "hall 3"):
+            store.plan([PlannedLocation("A-01", "A1")], site)
+        store.plan([PlannedLocation("A-02", "A1")])
+        other.merge(store)
+        assert (store.site, other.site) == ("hall 3", "hall 3")
+        with SqliteStore(store.folder, read_only=True) as reader:
+            assert reader.site == "hall 3"
+
+
+def test_looks_that_are_too_many_are_read_in_parts_as_they_are_all_at_once(tmp_path: Path) -> None:
+    with SqliteStore(tmp_path) as store:
+        for number in range(120):
+            store.commit(look(number), confirmed=number % 3 > 0)
+        parts = list(store.parts(50))
+        assert [len(part) for part in parts] == [50, 50, 20]
+        assert [one for part in parts for one in store.loaded(part)] == store.looks()
+        assert [one.id for part in parts for one in part] == [seen.id for seen, _ in store.looks()]
+        standing = {record.observation.id for record in store.locations() if record.observation}
+        assert store.standing_looks() == standing
+        assert store.newest_run() == store.looks()[-1][0].run
+
+
 def test_what_was_committed_is_read_back_as_it_was(tmp_path: Path) -> None:
     elements = (("01", "09501101530003"),)
     gs1 = CodeRead("Code 128", "0109501101530003", (), True, 3, 0.75, elements, module_px=2.9)
@@ -327,7 +352,8 @@ def test_what_was_withdrawn_stays_withdrawn_through_repeats_and_merges(tmp_path:
         assert [kept.id for kept in other.history(seen.location)] == [seen.id]
 
 
-TO_7 = ("DROP TABLE undecided_code",)
+TO_8 = ("DROP TABLE site",)
+TO_7 = (*TO_8, "DROP TABLE undecided_code")
 TO_6 = (
     *TO_7,
     "ALTER TABLE place_fill DROP COLUMN case_columns",
@@ -336,7 +362,7 @@ TO_6 = (
 )
 TO_5 = (*TO_6, "ALTER TABLE observation DROP COLUMN again")
 TO_4 = (*TO_5, "ALTER TABLE place_fill DROP COLUMN lean_m")
-TO_3 = (*TO_7, *TO_5[3:], "DROP TABLE place_fill")
+TO_3 = (*TO_7, *TO_5[4:], "DROP TABLE place_fill")
 TO_2 = (*TO_3, "ALTER TABLE code_read DROP COLUMN module_px", "DROP TABLE text_search")
 OLDER = {
     1: (*TO_2, "ALTER TABLE observation DROP COLUMN standing"),
@@ -346,6 +372,7 @@ OLDER = {
     5: TO_5,
     6: TO_6,
     7: TO_7,
+    8: TO_8,
 }
 
 
@@ -365,6 +392,9 @@ def test_an_inventory_of_an_earlier_format_is_taken_over_as_confirmed(tmp_path: 
         store.commit(unsure, confirmed=False)
         assert newest(store, look(2).location) is None
         assert store.history(look(2).location) == [unsure]
+        assert store.site == ""
+        store.plan([], "hall 3")
+        assert store.site == "hall 3"
 
 
 def newest(store: SqliteStore, location: str) -> str | None:
