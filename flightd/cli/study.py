@@ -7,6 +7,7 @@ import enum
 import os
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 EXAMPLES = """Examples:
   flightd study flights/ --with replay              would today's code decide the same?
   flightd study flights/ --with detect,codes,judge --json
+  flightd study /var/lib/flightd/flights --with codes --inventory /var/lib/flightd/inventory
   flightd study s3://hall-3/2026/ --with detect --engine ray --address ray://head:10001
 """
 
@@ -52,6 +54,13 @@ def study(
     address: Annotated[
         str, typer.Option(metavar="URL", help="The Ray cluster; RAY_ADDRESS, or one started for this.")
     ] = "",
+    inventory: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", exists=True, file_okay=False, show_default=False,
+            help="What the flights counted into, for codes.  Default: what lies beside each log.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="F", help="Write the findings there as they come, a line of JSON a log."),
@@ -64,7 +73,7 @@ def study(
     \b
     detect      the recorded pictures seen again, as `flightd replay` compares them
     replay      every decision made again
-    codes       the labels' pictures that the inventory beside the log keeps, read again
+    codes       the labels' pictures that the inventory keeps of the flight's run, read again
     judge       a simulated flight judged again by the truth beside it
     calibrate   the sensors fitted by the flight; what differs is told and no failure
 
@@ -78,6 +87,8 @@ def study(
     if address and engine is Engine.LOCAL:
         raise InputError("is for --engine ray alone", key="--address")
     chosen, sources = chosen_studies(studies), log_sources(paths)
+    if inventory is not None:
+        sources = [replace(source, inventory=str(inventory.resolve())) for source in sources]
     file = None if out is None else FindingsFile(out)
     found: dict[int, LogFindings] = {}
     ended: BaseException | None = None

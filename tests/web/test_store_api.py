@@ -17,15 +17,17 @@ import msgspec
 import pytest
 
 from flightd.adapters.ground_link.client import Address
+from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationState, PlaceFill, Standing, UndecidedCode
+from flightd.core.label_values import LabelValue, ValueKind, ValueSource
 from flightd.ground.access import access
 from flightd.ground.access.key_book import KeyBook, Scope
 from flightd.ground.access.passwords import hashed_secret, new_key
 from flightd.ground.access.roles import Role
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
 from flightd.ground.drop import Drop
-from flightd.ground.flights import flight_row
+from flightd.ground.flights import flight_row, log_folder
 from flightd.ground.ground_store import feeder as feeding
 from flightd.ground.ground_store.batch import Batch, SentFlight, SentLook
 from flightd.ground.ground_store.feeder import Feeder
@@ -100,8 +102,6 @@ async def asked(hall: Path, state: Path, *scopes: Scope) -> AsyncIterator[Progra
 async def test_every_endpoint_answers_as_its_document_says(hall: Path, tmp_path: Path) -> None:
     DecisionBook(hall).add("monday", Decision("decision-1", "AL-02-1-1", 5, 4, Decided.FINE, "ann"))
     shutil.copytree(hall / "monday", hall / "tuesday")
-    from flightd.adapters.store.sqlite import SqliteStore
-
     with SqliteStore(hall / "tuesday") as later:
         later.commit(look("AL-01-2-1", LocationState.EMPTY, run="2026-W48", at_s=604_800))
     async with asked(hall, tmp_path / "state", Scope.STOCK, Scope.PICTURES) as program:
@@ -365,12 +365,40 @@ def test_a_store_that_is_away_is_fed_when_it_is_back(
         assert store.counts()["looks"] == 10
 
 
+def test_a_station_says_what_of_its_folders_is_not_in_its_store(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    hall = tmp_path / "hall"
+    counted_store(hall / "monday")
+    for number in range(2):
+        flown_log(hall / f"{number}.mcap", RACKS)
+    monkeypatch.setattr(log_folder, "MOST_LOGS", 1)
+    with opened_store(str(tmp_path / "store.db")) as store:
+        feeder = Feeder(store, hall, (), tmp_path / "state")
+        for _ in range(2):
+            feeder.feed()
+        told = [record.getMessage() for record in caplog.records]
+        assert [line.partition(": not in the ground store: ")[0] for line in told] == [
+            "inventory monday", "flights",
+        ]  # fmt: skip
+        assert "monday: nothing says of which site the inventory is" in told[0]
+        assert "more lies there than" in told[1]
+        with SqliteStore(hall / "monday") as inventory:
+            inventory.plan([], SITE)
+        feeder.feed()
+        assert store.counts()["looks"] == 10
+
+
 @in_real_time
 async def test_a_folder_is_delivered_to_a_station_and_pruned_there(
     tmp_path: Path, flightd: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     inventory = tmp_path / "drone"
     counted_store(inventory)
+    with SqliteStore(inventory) as counted:
+        (empty,) = counted.history("AL-02-1-1")
+        lot = LabelValue(ValueKind.LOT, "B-4711", "", ValueSource.TEXT, 0.95)
+        counted.keep_texts(empty.id, [lot], "lots")
     headers = _keyed(tmp_path / "state", Scope.DELIVER, name="drone-1")
     with opened_store(str(tmp_path / "store.db")) as store:
         async with served(NOBODY, state=tmp_path / "state", store=store) as station:
@@ -396,4 +424,6 @@ async def test_a_folder_is_delivered_to_a_station_and_pruned_there(
             )
         ended = await asyncio.to_thread(flightd, *sent)
         assert (ended.returncode, "the station cannot be had" in ended.stderr) == (2, True)
-        assert store.stock("hall 3")[1]["texts"] == [f"00{SSCC}"]
+        stock = {row["location"]: row for row in store.stock("hall 3")}
+        assert stock["AL-01-1-1"]["texts"] == [f"00{SSCC}"]
+        assert [value["value"] for value in stock["AL-02-1-1"]["printed"]] == ["B-4711"]

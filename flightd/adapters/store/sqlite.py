@@ -336,9 +336,10 @@ class SqliteStore:
 
     def looks(self, location: str | None = None) -> list[tuple[Observation, Standing]]:
         """All looks, or those at one location, each with its standing, oldest first."""
-        chosen = () if location is None else ("location = ?", (location,))
         with self._reading():
-            return kept_looks(self._db, self._version, *chosen)
+            if location is None:
+                return kept_looks(self._db, self._version)
+            return kept_looks(self._db, self._version, "location = ?", (location,))
 
     def looks_of_run(self, run: str) -> list[tuple[Observation, Standing]]:
         """Those of one run, oldest first."""
@@ -366,7 +367,9 @@ class SqliteStore:
     def newest_run(self) -> str:
         """The run of the newest look, "" without one."""
         with self._reading():
-            row = self._db.execute("SELECT run FROM observation ORDER BY utc_ns DESC, id DESC LIMIT 1").fetchone()
+            row = self._db.execute(
+                "SELECT run FROM observation ORDER BY utc_ns DESC, id DESC LIMIT 1"
+            ).fetchone()
         return str(row[0]) if row else ""
 
     def newest_ns(self) -> int:

@@ -30,7 +30,7 @@ def study_source(source: LogSource, studies: tuple[Study, ...]) -> LogFindings:
         from flightd.app.log_study.studies import study_log
 
         with source.fetched(studies) as path:
-            return study_log(path, source.name, studies)
+            return study_log(path, source.name, studies, source.inventory)
     except Exception as err:  # noqa: BLE001 - its end would be that of all the others
         return all_failed(source.name, studies, told_in_line(err))
 

@@ -33,6 +33,8 @@ class LogSource:
 
     name: str
     place: str
+    inventory: str = ""
+    """The folder of the inventory that the flight counted into, where that is not the log's."""
 
     @property
     def is_local(self) -> bool:

@@ -11,6 +11,8 @@ from typing import Any, Final
 
 import cv2
 
+from flightd.adapters.store.evidence_pictures import EvidenceFolder
+from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.app.build import detector_of, pilot_of
 from flightd.app.log_study.finding import (
     Finding,
@@ -24,15 +26,14 @@ from flightd.app.log_study.recorded_simulation import recorded_simulation
 from flightd.app.recording import SETTING_TOPICS, recorded_setting
 from flightd.app.simulation.judgement import judge_flight
 from flightd.core.errors import InputError
-from flightd.core.inventory import LocationRecord
+from flightd.core.inventory import Standing
 from flightd.core.topics import Topic
 from flightd.core.types import Image
 from flightd.replay.decision_compare import comparison_document, replay_decisions
 from flightd.replay.log import read_log
+from flightd.replay.log_skim import skim
 from flightd.replay.perception_compare import replay_pictures
-from flightd.replay.report.stock import CountedStock
 from flightd.replay.tolerances import LAST_DIGITS, MOST_PIXELS
-from flightd.studies.counted_stock import counted_beside
 from flightd.studies.flight_calibration import calibrate_by_flight
 from flightd.vision.jpeg import decoded_jpeg
 from flightd.vision.shelf.code_reader import read_codes
@@ -42,13 +43,17 @@ _LOST_SHARE: Final = 0.02
 _JUDGED_WITHIN: Final = 1e-6
 
 
-def study_log(path: Path, name: str, studies: Sequence[Study]) -> LogFindings:
-    """Do each study with one log; what goes wrong with one is its finding, and costs the others nothing."""
+def study_log(path: Path, name: str, studies: Sequence[Study], inventory: str = "") -> LogFindings:
+    """Do each study with one log; what goes wrong with one is its finding, and costs the others nothing.
+    What the flight counted is in the folder `inventory`, or beside the log."""
     cv2.setNumThreads(1)  # the cores are shared out among the logs
     findings: dict[Study, Finding] = {}
     for study in studies:
         try:
-            findings[study] = _STUDIES[study](path)
+            if study is Study.CODES:
+                findings[study] = _codes(path, Path(inventory or path.parent))
+            else:
+                findings[study] = _STUDIES[study](path)
         except Exception as err:  # noqa: BLE001 - today's code may fail over a log: that is what is asked
             findings[study] = Finding(Outcome.FAILED, told_in_line(err).replace(f"{path.parent}/", ""))
     return LogFindings(name, findings)
@@ -76,16 +81,21 @@ def _replay(path: Path) -> Finding:
     return same_or(complaint, comparison_document(decisions))
 
 
-def _codes(path: Path) -> Finding:
-    if not (path.parent / "inventory.db").exists():
-        return Finding(Outcome.NOTHING, "no inventory beside it")
-    counted = counted_beside(path, path.parent)
-    assert counted is not None
+def _codes(path: Path, folder: Path) -> Finding:
+    if folder == path.parent and not (folder / "inventory.db").exists():
+        return Finding(Outcome.NOTHING, "no inventory beside it; say where it is: --inventory FOLDER")
+    run = skim(path).metadata.get("run", "")
+    with opened_for_reading(folder) as inventory:
+        found = inventory.looks_of_run(run) if run else inventory.looks()  # an old log does not say its run
+        looks = [seen for seen, standing in found if standing is Standing.CONFIRMED]
+        evidence = inventory.evidence
+    if not looks:
+        return Finding(Outcome.NOTHING, f"the inventory has no confirmed look of its run {run}".rstrip())
     pictures = gone = same = more = 0
     lost: list[str] = []
     other: list[str] = []
-    for record in counted.records:
-        before, picture = _texts(record), _kept(counted, record)
+    for seen in {seen.location: seen for seen in looks}.values():
+        before, picture = {read.text for read in seen.reads}, _kept(evidence, seen.evidence)
         if picture is None:
             gone += bool(before)
             continue
@@ -96,9 +106,9 @@ def _codes(path: Path) -> Finding:
         elif now == before:
             same += 1
         else:
-            (lost if now <= before else other).append(record.code)
+            (lost if now <= before else other).append(seen.location)
     if not pictures:
-        return Finding(Outcome.NOTHING, "no label's picture is kept beside it")
+        return Finding(Outcome.NOTHING, "no label's picture of it is kept")
     allowed = math.ceil(_LOST_SHARE * (same + len(lost)))
     told = []
     if other:
@@ -112,15 +122,12 @@ def _codes(path: Path) -> Finding:
     return same_or("; ".join(told), figures)
 
 
-def _texts(record: LocationRecord) -> set[str]:
-    return {read.text for read in record.observation.reads} if record.observation else set()
-
-
-def _kept(counted: CountedStock, record: LocationRecord) -> Image | None:
-    """The picture that vouches for a place, None where none is kept or it cannot be read."""
-    name = record.observation.evidence if record.observation else ""
-    jpeg = counted.picture(name) if name else None
-    return decoded_jpeg(jpeg) if jpeg else None
+def _kept(evidence: EvidenceFolder, name: str) -> Image | None:
+    """The picture of a look, None where it has or keeps none, or it cannot be read."""
+    try:
+        return decoded_jpeg(evidence.path(name).read_bytes()) if name else None
+    except (OSError, ValueError):
+        return None
 
 
 def _judge(path: Path) -> Finding:
@@ -170,7 +177,6 @@ _STUDIES: Mapping[Study, Callable[[Path], Finding]] = MappingProxyType(
     {
         Study.DETECT: _detect,
         Study.REPLAY: _replay,
-        Study.CODES: _codes,
         Study.JUDGE: _judge,
         Study.CALIBRATE: _calibrate,
     }

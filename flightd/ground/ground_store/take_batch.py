@@ -119,13 +119,13 @@ def _take_looks(engine: Engine, session: Session, site: int, batch: Batch, noted
     risen, fuller = [], []
     printed = {identity: printed_text(look.observation.texts) for identity, look in unique.items()}
     for identity, look in unique.items():
-        standing, known = kept.get(bytes.fromhex(identity), (Standing.WITHDRAWN, printed[identity]))
+        standing, before = kept.get(bytes.fromhex(identity), (Standing.WITHDRAWN, printed[identity]))
         if look.standing > standing:
             risen.append(look)
-        if says_more(printed[identity], known):
+        if says_more(printed[identity], before):
             fuller.append(look.observation)
         else:
-            printed[identity] = known
+            printed[identity] = before
     runs = _runs(session, site, [look.observation for look in new], noted)
     engine.make_room(session, {look.observation.utc_ns for look in new})
     session.run_many(_LOOK, [_row(look, places, runs) for look in new])

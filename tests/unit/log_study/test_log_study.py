@@ -9,23 +9,28 @@ import re
 import shutil
 import threading
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
+from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.log_study.engines import Work, run_local, study_source
 from flightd.app.log_study.finding import LogFindings, Outcome, Study
 from flightd.app.log_study.ray_engine import run_ray
 from flightd.app.log_study.sources import LogSource, log_sources
 from flightd.config.schema import load_config
+from flightd.core.inventory import LocationState
 from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.replay.log import read_log
 from tests.command import Command
 from tests.replay.synthetic_flight import write_flight
 from tests.rigs.extras import of_extra
 from tests.unit.log_study.dying_work import always_dies, dies_once, fails
+from tests.web.stock_rig import code, look, picture_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 STUDIES = (Study.DETECT, Study.JUDGE)
@@ -107,6 +112,30 @@ def test_a_flight_of_today_is_seen_decided_and_judged_as_it_was(
     ended = flightd("study", other / "flight.mcap", "--with", "judge")
     assert ended.returncode == 1
     assert "cross_track_rms_m" in ended.stdout
+
+
+def test_a_flights_labels_are_those_of_its_own_run_wherever_its_inventory_is(
+    flightd: Command, tmp_path: Path
+) -> None:
+    archive = FlightArchive(tmp_path / "flights", 1 << 30)
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for day, (run, told) in enumerate({"monday": "PAL-1", "tuesday": "PAL-2", "wednesday": ""}.items()):
+            log = archive.begin(datetime(2026, 11, 23 + day, tzinfo=UTC))
+            with McapRecorder(log, metadata={"run": run}, when_full=wait_for_disk):
+                pass
+            if told:
+                kept = inventory.keep_evidence(picture_of("PAL-1"))
+                seen = look("A-1", LocationState.READ, code(told), run=run, at_s=day, evidence=kept)
+                inventory.commit(seen)
+    studied = ("study", tmp_path / "flights", "--with", "codes", "--json", "--workers", 1)
+    ended = flightd(*studied, "--inventory", tmp_path / "inventory")
+    told_of = [log["studies"]["codes"] for log in json.loads(ended.stdout)["logs"]]
+    assert [(told["outcome"], told["text"]) for told in told_of] == [
+        ("same", ""),
+        ("different", "1 places read otherwise, first A-1"),
+        ("nothing", "the inventory has no confirmed look of its run wednesday"),
+    ]
+    assert json.loads(flightd(*studied).stdout)["outcomes"]["codes"] == {"nothing": 3}
 
 
 @pytest.mark.parametrize("work", [dies_once, always_dies])

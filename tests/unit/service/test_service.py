@@ -131,6 +131,7 @@ def test_a_delivery_yields_to_everything_and_waits_for_its_file() -> None:
     assert {"CPUSchedulingPolicy=idle", "IOSchedulingClass=idle", "Nice=19", "CPUWeight=1"} <= found
     assert "ConditionPathExists=/etc/flightd/deliver.env" in found
     assert "EnvironmentFile=/etc/flightd/deliver.env" in found
+    assert any(line.endswith(" TMPDIR=/var/tmp") for line in found), "a copy of the inventory, on the disk"
     assert "WantedBy=timers.target" in settings(DELIVER_UNIT.with_suffix(".timer"))
 
 
