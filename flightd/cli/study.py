@@ -57,7 +57,10 @@ def study(
     inventory: Annotated[
         Path | None,
         typer.Option(
-            metavar="FOLDER", exists=True, file_okay=False, show_default=False,
+            metavar="FOLDER",
+            exists=True,
+            file_okay=False,
+            show_default=False,
             help="What the flights counted into, for codes.  Default: what lies beside each log.",
         ),
     ] = None,

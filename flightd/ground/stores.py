@@ -87,8 +87,8 @@ class Stores:
         return view
 
     def site_name(self, name: str) -> str:
-        """The name of the site that a store is of, as it says itself, else by the map in the flight log beside
-        it; empty without either.  InputError where there is no store of the name."""
+        """The name of the site that a store is of, as it says itself, else as the flight log beside it
+        has it; empty without either.  InputError where there is no store of the name."""
         folder, stamp = self.folder(name), _stamp(self.folder(name))
         known = self._site_names.get(folder)
         if known is None or known[0] != stamp:

@@ -24,7 +24,7 @@ from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 
 NEWEST_CONFIRMED: Final = (
-    f"SELECT (SELECT id FROM observation WHERE location = code AND standing = {Standing.CONFIRMED:d}"
+    f"SELECT (SELECT id FROM observation WHERE location = code AND standing = {Standing.CONFIRMED:d}"  # noqa: S608
     " ORDER BY utc_ns DESC, id DESC LIMIT 1) FROM location"
 )
 """The ids of the looks by which the locations stand, NULL for one without."""

@@ -42,6 +42,7 @@ from flightd.adapters.store.schema import (
 from flightd.adapters.store.undecided_codes import keep_undecided
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation, Standing
+from flightd.core.label_values import LabelValue
 from flightd.core.scanning import CountedPlace
 from flightd.core.types import CodeRead
 
@@ -197,7 +198,8 @@ class SqliteStore:
             )
             if site:
                 self._db.execute(
-                    "INSERT INTO site VALUES (1, ?) ON CONFLICT (only_one) DO UPDATE SET name = excluded.name",
+                    "INSERT INTO site VALUES (1, ?)"
+                    " ON CONFLICT (only_one) DO UPDATE SET name = excluded.name",
                     (site,),
                 )
 
@@ -319,7 +321,9 @@ class SqliteStore:
         with self._reading():
             looks = kept_looks(self._db, self._version, f"id IN ({NEWEST_CONFIRMED})")
             newest = {seen.location: seen for seen, _ in looks}
-            return [LocationRecord(code, node, newest.get(code), deep) for code, node, deep in self._planned()]
+            return [
+                LocationRecord(code, node, newest.get(code), deep) for code, node, deep in self._planned()
+            ]
 
     def planned(self) -> list[PlannedLocation]:
         """Every location by its code, whatever was seen there."""

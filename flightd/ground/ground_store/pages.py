@@ -23,7 +23,7 @@ _DIFFERENCES = (
 _LOOKS = (
     "SELECT observation.utc_ns, observation.id, place.code, run.name, observation.state,"
     " observation.confidence, standing, observation.node, x_m, y_m, height_m, yaw_rad, observation.evidence,"
-    " reads, observation.fill, observation.undecided, printed, again FROM observation"
+    " reads, observation.fill, observation.undecided, observation.printed, again FROM observation"
     " JOIN place ON place.id = observation.place JOIN run ON run.id = observation.run"
 )
 

@@ -17,7 +17,7 @@ _PART = 10_000
 _LOOKS = (
     "SELECT observation.utc_ns, observation.id, site.name, run.name, place.code, observation.state,"
     " observation.confidence, standing, observation.node, x_m, y_m, height_m, yaw_rad, observation.evidence,"
-    " reads, observation.undecided, printed, again, observation.fill FROM observation"
+    " reads, observation.undecided, observation.printed, again, observation.fill FROM observation"
     " JOIN place ON place.id = observation.place JOIN run ON run.id = observation.run"
     " JOIN site ON site.id = run.site WHERE observation.run = ?"
     " AND (observation.utc_ns, observation.id) > (?, ?) ORDER BY observation.utc_ns, observation.id LIMIT ?"

@@ -12,7 +12,6 @@ from flightd.core.label_values import LabelValue
 from flightd.core.types import CodeRead
 from flightd.inventory.export.json_document import undecided_json
 
-
 NOTHING_PRINTED = "[]"
 
 

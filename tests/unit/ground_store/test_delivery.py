@@ -233,9 +233,7 @@ def test_an_inventory_of_no_known_site_is_refused(store: GroundStore, tmp_path: 
     counted_store(tmp_path / "monday")
     (tmp_path / "empty").mkdir()
     done = Delivered()
-    deliver_paths(
-        [tmp_path / "monday" / "inventory.db", tmp_path / "empty"], "", "station", store, done
-    )
+    deliver_paths([tmp_path / "monday" / "inventory.db", tmp_path / "empty"], "", "station", store, done)
     assert done.failures == [
         f"{tmp_path}/monday: nothing says of which site the inventory is; deliver it with --site NAME, or"
         " FLIGHTD_SITE",
