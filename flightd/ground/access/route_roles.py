@@ -159,6 +159,7 @@ RULES: Mapping[str, Rule] = {
     "GET /api/v1/pictures/{name}": Rule(Role.VIEWER, Line.NONE, Scope.PICTURES),
     "POST /api/v1/deliveries": _DELIVERS,  # the store's own books have each
     "POST /api/v1/deliveries/standings": _DELIVERS,
+    "POST /api/v1/deliveries/printed-texts": _DELIVERS,
     "POST /api/v1/deliveries/missing-pictures": _DELIVERS,
     "POST /api/v1/deliveries/pictures": _DELIVERS,
 }
