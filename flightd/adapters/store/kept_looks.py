@@ -53,8 +53,8 @@ def ids_and_texts(db: sqlite3.Connection, version: int) -> sqlite3.Cursor:
 
 def kept_look(row: tuple[Any, ...]) -> KeptLook:
     """TypeError or ValueError for a row of another program."""
-    *named, standing, found = row
-    return KeptLook(*named, Standing(standing), found_texts(found))
+    look, run, evidence, standing, found = row
+    return KeptLook(look, run, evidence, Standing(standing), found_texts(found))
 
 
 def kept_looks(

@@ -40,8 +40,8 @@ class StubbornStore:
         self.runs = threading.Event()
         self.runs.set()
 
-    def plan(self, locations: Iterable[PlannedLocation]) -> None:
-        self._store.plan(locations)
+    def plan(self, locations: Iterable[PlannedLocation], site: str = "") -> None:
+        self._store.plan(locations, site)
 
     def keep_evidence(self, jpeg: bytes) -> str:
         return self._store.keep_evidence(jpeg)
