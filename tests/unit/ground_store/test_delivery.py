@@ -19,7 +19,7 @@ import pytest
 
 from flightd.adapters.store.kept_looks import KeptLook
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.errors import UnavailableError
+from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationState, Observation, PlannedLocation, Standing
 from flightd.core.label_values import LabelValue, ValueKind, ValueSource
 from flightd.core.types import CodeRead

@@ -112,7 +112,7 @@ def test_a_server_that_stays_away_is_one_line(host: str, tmp_path: Path, connect
 
 
 def test_many_ask_for_pictures_at_once(host: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from flightd.ground import known_host_sftp
+    from flightd.runtime import known_host_sftp
 
     monkeypatch.setattr(known_host_sftp, "_WAIT_S", 2.0)
     with opened_store(str(tmp_path / "counts.db"), f"{host}{tmp_path}/pictures") as store:
