@@ -118,7 +118,7 @@ class Flown:
         drones = [asyncio.ensure_future(self._drone(name)) for name in PADS]
         station = await self._station()
         try:
-            done = 0
+            done, begun = 0, True
             while (now_s := time.monotonic()) < self._ends_s:
                 await asyncio.sleep(_LOOK_S)
                 if self._kills_s and now_s > self._kills_s[0]:
@@ -126,7 +126,7 @@ class Flown:
                     os.killpg(station.pid, signal.SIGKILL)
                     await station.wait()
                     await asyncio.sleep(_AWAY_S)
-                    station = await self._station()
+                    station, begun = await self._station(), True
                     continue
                 told = await asyncio.to_thread(self._asked, "/api/fleet")
                 if not told.get("flies"):
@@ -134,8 +134,11 @@ class Flown:
                 self.visited += max(len(told["done"]) - done, 0)
                 done = len(told["done"])
                 left_s = (self._ends_s - now_s) * self._pace
-                if not told["open"] and not told["given"] and left_s > _LAST_TOUR_S:
+                is_over = not told["open"] and not told["given"]
+                # nobody leaves the ground for what a dead station was asked for, till a person asks anew
+                if (is_over or begun) and left_s > _LAST_TOUR_S:
                     await asyncio.to_thread(self._asked, "/api/fleet/tour", {"nodes": NODES})
+                    begun = False
         finally:
             for drone in drones:
                 drone.cancel()
