@@ -155,7 +155,8 @@ class World:
             def lamp() -> float:
                 return _LAMP if autopilot.lamp_lit else 0.0
 
-        self._charge_pads = None if spec.truth_url else ChargePads(spec.site, airframe, spec.pads)
+        serves = spec.pads != PadService() and not spec.truth_url
+        self._charge_pads = ChargePads(spec.site, airframe, spec.pads) if serves else None
         self._cameras = {"camera": _down_camera(spec, self.vehicle, clock, show, hold)}
         if own_front is not None:
             self._cameras["ardrone-front-camera"] = own_front

@@ -249,6 +249,8 @@ class FloorFilter:
         features told the motion where no line did."""
         self._drop(forgotten_features(self.held, self._refused, stamp_ns))
         before = self._x[:FIRST_LINE].copy()
+        for line, held in enumerate(self.held):  # it was dead-reckoned on, if it was not seen
+            held.lever_to(self.mean(FIRST_LINE + line))
         known, fresh = associate(
             sights,
             self.held,
@@ -278,7 +280,6 @@ class FloorFilter:
             held.seen_ns, held.hits = stamp_ns, held.hits + 1
             held.width_m += 0.2 * (sight.width_m - held.width_m)
             held.from_m, held.to_m = sight.from_m, sight.to_m
-            held.lever_to(self.mean(FIRST_LINE + line))
         self._refind([line for _, line in known], stamp_ns)
         for sight in fresh:
             self._add(sight, rates, stamp_ns, before)
@@ -341,7 +342,7 @@ class FloorFilter:
         self._bound_push()
         kept, found = self.held[old], self.held[new]
         kept.seen_ns, kept.hits, kept.width_m = found.seen_ns, kept.hits + found.hits, found.width_m
-        kept.from_m, kept.to_m = found.from_m, found.to_m
+        kept.from_m, kept.to_m, kept.lever_m = found.from_m, found.to_m, found.lever_m
 
     def _begin_anew(self, states: list[int]) -> None:
         """These are as unknown as at first, and nothing that is known says anything of them."""

@@ -29,7 +29,6 @@ _TOGETHER = {
     "tests/sim/pictures/test_shelf_reading.py",
     "tests/unit/cli/test_vision_commands.py",
     "tests/unit/log_study/test_log_study.py",
-    "tests/unit/log_study/test_ray_cluster.py",
     "tests/unit/foxglove/test_logged_for_viewers.py",
     "tests/web/test_flight_folder.py",
     "tests/web/test_flight_functions.py",

@@ -33,7 +33,7 @@ def deliver(
         typer.Option(
             metavar="NAME",
             envvar="FLIGHTD_SITE",
-            help="Of which site it is.  Default: as the inventory says, else the flight log beside it.",
+            help="Of which site all is.  Default: as each inventory says, else the flight log beside it.",
             show_default=False,
         ),
     ] = "",
@@ -48,7 +48,7 @@ def deliver(
 
     What is told to be delivered is on the store's disk.  However often it is cut and begun again, nothing is
     lost and nothing is there twice.  The folders are only read.  What cannot be delivered is told in a line,
-    and costs the others nothing; the command ends with exit 1 then.
+    and costs the others nothing; the command ends with exit 1 then, with 2 where a clock is wrong.
 
     \b
     Examples:

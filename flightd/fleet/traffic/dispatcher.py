@@ -190,9 +190,11 @@ class Dispatcher:
             self.queue.give_up(node, f"{drone}: {why}")
 
     def _free(self, nodes: Collection[str]) -> None:
-        """Drones may come there again."""
+        """Drones may come there again, and by there to what no battery reached."""
         if nodes:
             self._tries.clear()
+            self._reach = Reach()
+            self.queue.retry([node for node, why in self.queue.reasons.items() if why == BEYOND])
         self.queue.retry(nodes)
 
     def _hear(self, report: DroneReport, now_ms: int) -> None:
@@ -421,7 +423,7 @@ class Dispatcher:
         left_ms, budget_ms = self._left_ms(drone), self._budget_ms(drone)
         busy = {self.queue.work(node).aisle for node in self.queue.given}
         out, times = self._closed_to(drone), self._times(course.place, home)
-        share_ms = self.queue.takes_ms(times) // among if self._shares else None
+        share_ms = self.queue.takes_ms(times, drone, out) // among if self._shares else None
         nodes = self.queue.tour(times, budget_ms, busy, share_ms, drone, out)
         ends = (home,)
         while nodes:

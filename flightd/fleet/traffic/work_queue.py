@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
+from flightd.fleet.traffic.motions import NEVER
+
 _VALUE_SPAN_MS: Final = 3_600_000
 """A class of value outweighs the way to it up to so long."""
 _MOST_OF_TOUR: Final = 40
@@ -197,11 +199,14 @@ class WorkQueue:
             self._open.pop(node)
             self._given[node] = drone
 
-    def takes_ms(self, times: TourTimes) -> int:
-        """How long all that may be begun now takes at least, the way out to each aisle with it."""
+    def takes_ms(self, times: TourTimes, drone: str = "", without: Collection[str] = ()) -> int:
+        """How long all that may be begun now, by this drone and `without` some, takes at least, the way out
+        to each aisle with it."""
         aisles: dict[str, list[NodeWork]] = {}
         for node in self.ready:
-            aisles.setdefault(self._work[node].aisle, []).append(self._work[node])
+            work = self._work[node]
+            if node not in without and work.drone in {"", drone} and times.out_ms(node) < NEVER:
+                aisles.setdefault(work.aisle, []).append(work)
         total_ms = 0
         for works in aisles.values():
             works.sort(key=lambda work: work.index)

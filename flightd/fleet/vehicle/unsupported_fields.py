@@ -22,7 +22,8 @@ _OF_EDGES: Final = (
 _NAMES: Final = {field.name: field.encode_name for field in msgspec.structs.fields(Edge)}
 _HEADS_SO_RAD: Final = 0.2
 """By so much a drone that stands is turned otherwise than it tells."""
-_ROUNDED_RAD: Final = 1e-4
+_ROUNDED_RAD: Final = 0.01
+"""3.14 is half a turn."""
 
 
 def unsupported_field(order: Order, speed_mps: float, theta: float | None) -> tuple[str, str] | None:

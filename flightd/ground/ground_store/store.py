@@ -78,7 +78,9 @@ class GroundStore:
             if is_noted and session.rows("SELECT 1 FROM delivery WHERE id = ?", identity):
                 taken = Taken()
             else:
-                taken = take_batch(self._engine, session, replace(batch, looks=looks), utc_ns)
+                planned_ns = 0 if batch.planned_ns > utc_ns + MOST_AHEAD_NS else batch.planned_ns
+                kept = replace(batch, looks=looks, planned_ns=planned_ns)
+                taken = take_batch(self._engine, session, kept, utc_ns)
                 if is_noted and not ahead:
                     note = "INSERT INTO delivery VALUES (?, ?, ?, ?)"
                     session.run(note, identity, batch.source, utc_ns, len(looks))

@@ -26,8 +26,8 @@ _MOST_URGENT: Final = 8
 _URGENT: Final = frozenset({"startPause", "cancelOrder"})
 _SEND_ON: Final = frozenset({"stopPause"})
 """Nobody is sent on by a manager who could not know how it was."""
-_NOT_HEARD: Final = "the station did not hear the drone when this came: look, and send it again"
-_TOO_MANY: Final = f"{_MOST_WAITING} messages wait already: send it again"
+_NOT_HEARD: Final = "the station did not hear the drone when this came: look, and send it anew"
+_TOO_MANY: Final = f"{_MOST_WAITING} messages wait already: send it anew"
 
 
 class ManagerInbox:

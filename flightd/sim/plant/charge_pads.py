@@ -19,7 +19,7 @@ _WORTH_FRAC = 0.9
 """A fuller battery is left where it is."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class PadService:
     """`swap_s`: the time in which somebody changes the battery of a drone that has flown; `contact_s`: that
     in which contacts fill an empty one.  0: nobody does, there are none."""
