@@ -423,7 +423,9 @@ class Dispatcher:
         left_ms, budget_ms = self._left_ms(drone), self._budget_ms(drone)
         busy = {self.queue.work(node).aisle for node in self.queue.given}
         out, times = self._closed_to(drone), self._times(course.place, home)
-        share_ms = self.queue.takes_ms(times, drone, out) // among if self._shares else None
+        # one alone takes all that fits: the order by value takes longer than the shortest
+        shares = self._shares and among > 1
+        share_ms = self.queue.takes_ms(times, drone, out) // among if shares else None
         nodes = self.queue.tour(times, budget_ms, busy, share_ms, drone, out)
         ends = (home,)
         while nodes:
