@@ -70,7 +70,7 @@ def test_two_that_are_low_never_come_to_one_pad() -> None:
         await until(lambda: fleet.flown(other.name), 30)
         fleet.drones[first].charges_per_s = 0.02
         fleet.own.ask(["A4"], other.name)
-        await until(lambda: fleet.drones[first].phase is Phase.DONE, 500)  # it made room
+        await until(lambda: fleet.drones[first].phase is Phase.DONE, 300)  # it made room
         await until(lambda: holder(fleet) == (other.name, True), 200)
 
     fly(go, "ab", docks=DOCKS)
