@@ -73,11 +73,16 @@ def all_failed(log: str, studies: Iterable[Study], text: str) -> LogFindings:
     return LogFindings(log, {study: Finding(Outcome.FAILED, text) for study in studies})
 
 
+def first_line(err: BaseException) -> str:
+    """Of what an error says; empty where it says nothing."""
+    return next((line.strip() for line in str(err).splitlines() if line.strip()), "")
+
+
 def told_in_line(err: BaseException) -> str:
     """What went wrong with a log, in one line: of what flightd did not foresee, where in it that was, too."""
     if isinstance(err, FlightdError):
         return str(err)
-    text = next((line.strip() for line in str(err).splitlines() if line.strip()), "")
+    text = first_line(err)
     told = f"{type(err).__name__}: {text}" if text else type(err).__name__
     frames = traceback.extract_tb(err.__traceback__)
     at = next((frame for frame in reversed(frames) if Path(frame.filename).is_relative_to(_FLIGHTD)), None)

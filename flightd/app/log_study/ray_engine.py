@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from flightd import __version__
 from flightd.app.log_study.engines import DIED, MOST_DEATHS, WAITING, Work, study_source
-from flightd.app.log_study.finding import LogFindings, Study, all_failed, told_in_line
+from flightd.app.log_study.finding import LogFindings, Study, all_failed, first_line, told_in_line
 from flightd.app.log_study.sources import LogSource
 from flightd.core.errors import InputError, UnavailableError
 
@@ -188,4 +188,4 @@ def _found(ray: Any, reference: Any, source: LogSource, studies: tuple[Study, ..
 
 
 def _line(err: Exception) -> str:
-    return next((line.strip() for line in str(err).splitlines() if line.strip()), type(err).__name__)
+    return first_line(err) or type(err).__name__

@@ -99,7 +99,7 @@ class Dispatcher:
         """What nobody flies, by name."""
         self._refusals: dict[str, int] = {}
         self._reach = Reach()
-        queue.retry([node for node, why in queue.reasons.items() if why == BEYOND])
+        queue.retry(queue.not_done_for(BEYOND))
         self.holding = 0
 
     def step(self, now_ms: int, reports: Iterable[DroneReport]) -> Commands:
@@ -125,7 +125,7 @@ class Dispatcher:
         for closure in gone:
             del self.closed[closure.name]
             self.control.open(closure.name)
-            self._free({*closure.nodes, *(n for n, why in self.queue.reasons.items() if why == NO_WAY)})
+            self._free({*closure.nodes, *self.queue.not_done_for(NO_WAY)})
         new = [closure for name, closure in wanted.items() if name not in self.closed]
         for closure in new:
             self.closed[closure.name] = closure
@@ -194,7 +194,7 @@ class Dispatcher:
         if nodes:
             self._tries.clear()
             self._reach = Reach()
-            self.queue.retry([node for node, why in self.queue.reasons.items() if why == BEYOND])
+            self.queue.retry(self.queue.not_done_for(BEYOND))
         self.queue.retry(nodes)
 
     def _hear(self, report: DroneReport, now_ms: int) -> None:

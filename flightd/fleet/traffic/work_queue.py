@@ -187,6 +187,10 @@ class WorkQueue:
         self.hand_back([node], reason)
         self._given_up.add(node)
 
+    def not_done_for(self, reason: str) -> list[str]:
+        """The nodes that are not to be done for this reason."""
+        return [node for node, why in self.reasons.items() if why == reason]
+
     def retry(self, nodes: Iterable[str]) -> None:
         """What was not to be done may be done now."""
         for node in nodes:

@@ -244,7 +244,7 @@ def test_without_swaps_it_ends_on_the_pad_and_the_plan_left_over_is_flown_by_the
     assert (*done, *second.visited) == THREE
 
 
-def test_the_battery_swapper_changes_the_battery_of_a_drone_that_came_back() -> None:
+def test_somebody_changes_the_battery_of_a_drone_that_came_back() -> None:
     flight = IdealFlight(DEMO, config(), visits=("A2",))
     frame = flight.airframe
     swapper = ChargePads(DEMO, frame, PadService(swap_s=30.0))
