@@ -31,10 +31,10 @@ SIGNED_IN = """import("/static/app/store.js").then(({ update }) => update((s) =>
 }))"""
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
     """With a recorded flight, and a profile that Ann installed before."""
-    folder = flown_folder(tmp_path_factory.mktemp("studio-page"))
+    folder = flown_folder(tmp_path)
     shipped = load_profile("yellow")
     save_profile(shipped, folder / "first.npz")
     content = (folder / "first.npz").read_bytes()
@@ -42,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def url(folder: Path) -> Iterator[str]:
     """Of a station with a drone that cannot be reached, and one that stands."""
     with CameraDrone().standing() as eye, station(["demo=127.0.0.1:1/1", eye.at], folder=folder) as url:

@@ -102,6 +102,10 @@ def from_log(root: Path, relative: str, place: PicturePlace) -> TakenIn:
     return TakenIn(jpeg, width, height)
 
 
+def get_ready() -> None:
+    """All that is to be read before the first picture is read with this module."""
+
+
 def from_upload(file: Path) -> TakenIn:
     """A photograph or a live picture, written anew as JPEG.  InputError for what is none, or too large."""
     picture = _decoded(file.read_bytes())

@@ -127,6 +127,7 @@ class _Asked:
 
     async def overview(self, _request: Request) -> Response:
         studio = self._studio
+        studio.get_ready()
         sets = await studio.disk.run(studio.sets.names)
         shelved = await studio.disk.run(studio.shelf.shelved)
         return as_json(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,7 @@ from flightd.ground.studio.lessons import (
     TakenIn,
     from_log,
     from_upload,
+    get_ready,
     mask_of,
     train_and_score,
     training_hash_of,
@@ -73,6 +75,7 @@ class Studio:
         self.disk = Threads(2, 32, "too much waits for the disk already")
         self._orders: asyncio.Queue[tuple[str, tuple[str, ...]]] = asyncio.Queue(1)
         self._trainings: dict[str, Training] = {}
+        self._readied: asyncio.Task[None] | None = None
 
     async def run(self) -> None:
         try:
@@ -84,8 +87,19 @@ class Studio:
                 except (FlightdError, OSError) as err:
                     self._trainings[name] = Training(name, running=False, refused=str(err))
         finally:
+            if self._readied is not None:
+                self._readied.cancel()
             self._looking.close()
             self._learning.close()
+
+    def get_ready(self) -> None:
+        """Begin to read the code that looks at pictures, which takes seconds: somebody is about to ask it."""
+        if self._readied is None:
+            self._readied = asyncio.create_task(self._read_code())
+
+    async def _read_code(self) -> None:
+        with contextlib.suppress(FlightdError):  # whoever asks next is told of it
+            await self._looking.run(get_ready, _WITHIN_S)
 
     def training_of(self, name: str) -> Training | None:
         return self._trainings.get(name)
