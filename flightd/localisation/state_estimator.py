@@ -280,11 +280,12 @@ class StateEstimator:
         if used and by_width_m is not None:
             carried.by_width(exposed_ns, by_width_m, climbed_m)
         # without a range finder the lines alone contradict the climb: such a drone lands anyhow
-        told_m = by_width_m if math.isnan(measured_m) else measured_m
+        alone = math.isnan(measured_m)
+        told_m = by_width_m if alone else measured_m
         if told_m is not None and told_m < _CLIMB_DOUBT_M and not self.climb.found:
             self.climb.forget()
         elif used and told_m is not None and by_width_m is not None and math.isfinite(climbed_m):
-            self.climb.step(exposed_ns, told_m, by_width_m, climbed_m)
+            self.climb.step(exposed_ns, told_m, by_width_m, climbed_m, alone=alone)
             if self.climb.found:
                 carried.forget()
 

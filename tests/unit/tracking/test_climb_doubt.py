@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import pytest
@@ -44,6 +45,31 @@ def test_one_of_them_alone_does_not_contradict_the_climb(range_m: Of, width_m: O
     doubt, now_ns = flown(range_m, width_m, climbed_m)
     assert not doubt.found
     assert abs(doubt.error_mps(now_ns)) < 0.15
+
+
+def alone(width_m: Of, shows: Callable[[float], bool] = lambda _: True) -> ClimbDoubt:
+    """After 3 s of hovering at 1.6 m, of which the range finder tells the first; lines show then and when."""
+    doubt = ClimbDoubt()
+    for frame in range(round(3e9 / _FRAME_NS)):
+        at_s = frame * _FRAME_NS * 1e-9
+        if at_s < 1.0:
+            doubt.step(1 + frame * _FRAME_NS, 1.6, 1.6, 0.0)
+        elif shows(at_s):
+            doubt.step(1 + frame * _FRAME_NS, width_m(at_s), width_m(at_s), 0.0, alone=True)
+    return doubt
+
+
+def test_lines_alone_contradict_the_climb_once_they_do_so_for_long() -> None:
+    assert alone(lambda s: 1.6 + max(s - 1.0, 0.0)).found
+    assert not alone(lambda _: 1.6).found
+
+
+def test_what_looks_like_a_line_in_a_few_frames_contradicts_nothing() -> None:
+    for until_s in (2.5, 2.6, 2.7):
+        doubt = alone(lambda _: 1.2, lambda s, until_s=until_s: 2.45 < s < until_s)  # type: ignore[misc]
+        assert not doubt.found
+        assert doubt.error_mps(round(until_s * 1e9)) == 0.0
+    assert not alone(lambda _: 1.2, lambda s: math.fmod(s, 0.3) < 0.1).found, "it comes and goes"
 
 
 def test_what_is_wrong_once_is_not_put_right_by_heights_that_do_not_agree_or_are_old() -> None:
