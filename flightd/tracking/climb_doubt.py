@@ -3,8 +3,8 @@
 An autopilot flies by its own climb rate.  Where a door opens or a duct blows, the barometer's air moves, and
 a drone that is to hover climbs while it tells that it does not.  Goods below move the range finder alone, a
 range finder that sticks leaves the width of the lines to change alone: only both together contradict it.
-Where the range finder tells nothing the lines contradict it alone, once they have done so for a while: over
-bare floor a seam that shows in one frame is as wide as a line from another height.
+Where the range finder tells nothing the lines contradict it alone, but only those that are seen for a while:
+over bare floor a seam that shows in a few frames is as wide as a line from another height.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ From `_NOTICED_M` on the climb is put right: a door's gust moves a drone by a me
 _AGREEING_M, _AGREEING_SHARE = 0.12, 0.25
 """So far the changes of the two heights may differ: one of them is scaled, the other one noisy."""
 _ALONE_NS, _GAP_NS = 400_000_000, 150_000_000
-"""So long lines alone have to contradict it, in frames no further apart."""
+"""So long lines have to be seen to tell anything alone, in frames no further apart."""
 _RATE_NS, _HELD_NS = 300_000_000, 500_000_000
 """The error of the rate is that of the newest samples that span so long, and holds for so long without."""
 
@@ -39,8 +39,9 @@ class ClimbDoubt:
         self.found = False
         """Stays so until the end of the flight."""
         self._noticed = False
-        self._since_ns: int | None = None
-        """Since when each frame was off by what is noticed."""
+        self._last: _Sample | None = None
+        self._since_ns = 0
+        """Since when each frame's width went on from that of the one before."""
         self._samples: deque[_Sample] = deque()
 
     def step(
@@ -53,13 +54,13 @@ class ClimbDoubt:
         samples = self._samples
         while samples and stamp_ns - samples[0].stamp_ns > _WINDOW_NS:
             samples.popleft()
-        off_m = _most_off_m(new, samples)
-        if off_m <= _NOTICED_M:
-            self._since_ns = None
-        elif self._since_ns is None or stamp_ns - samples[-1].stamp_ns > _GAP_NS:
+        if not self._goes_on(new):
             self._since_ns = stamp_ns
-        lasted_ns = 0 if self._since_ns is None else stamp_ns - self._since_ns
-        off_m = 0.0 if alone and lasted_ns < _ALONE_NS else off_m
+        self._last = new
+        if alone and stamp_ns - self._since_ns < _ALONE_NS:
+            self._noticed = self.found
+            return
+        off_m = _most_off_m(new, samples)
         self.found = self.found or off_m > _OFF_M
         self._noticed = self.found or off_m > _NOTICED_M
         samples.append(new)
@@ -67,7 +68,15 @@ class ClimbDoubt:
     def forget(self) -> None:
         """What was told of the climb was interrupted: nothing older is compared."""
         self._samples.clear()
-        self._since_ns = None
+        self._last = None
+
+    def _goes_on(self, new: _Sample) -> bool:
+        last = self._last
+        return (
+            last is not None
+            and new.stamp_ns - last.stamp_ns <= _GAP_NS
+            and abs(new.width_m - last.width_m) < _AGREEING_M
+        )
 
     def error_mps(self, now_ns: int) -> float:
         """How much too great the told rate is; 0 where nothing is noticed, and while the heights do not agree

@@ -70,6 +70,8 @@ def test_what_looks_like_a_line_in_a_few_frames_contradicts_nothing() -> None:
         assert not doubt.found
         assert doubt.error_mps(round(until_s * 1e9)) == 0.0
     assert not alone(lambda _: 1.2, lambda s: math.fmod(s, 0.3) < 0.1).found, "it comes and goes"
+    seam, line = (lambda s: 1.2 if s < 2.0 else 1.6), (lambda s: 1.9 < s < 1.97 or s > 2.2)
+    assert not alone(seam, line).found, "the line is not held against the seam"
 
 
 def test_what_is_wrong_once_is_not_put_right_by_heights_that_do_not_agree_or_are_old() -> None:
