@@ -20,6 +20,8 @@ from flightd.fleet.traffic.plan import Action
 
 ActionKey: TypeAlias = tuple[str, int]
 """A drone and the number of its action, counted over its whole life."""
+_Spell: TypeAlias = tuple[int, int, str, int]
+"""For which a resource is taken: from and to, milliseconds; by whom, for which of its actions."""
 
 
 class CyclicDependenciesError(FlightdError):
@@ -71,30 +73,24 @@ class ActionGraph:
                     yield before, (drone, number)
 
     def _depend(self, conflicts: Conflicts) -> None:
-        users: dict[int, list[tuple[int, int, str, int]]] = {}
+        users: dict[int, list[_Spell]] = {}
         for drone, course in self._courses.items():
             for number, action in enumerate(course.actions, start=course.first):
                 users.setdefault(action.resource, []).append((action.start_ms, action.end_ms, drone, number))
+        for spells in users.values():
+            spells.sort()
+        near: dict[int, list[list[_Spell]]] = {}
         for drone, course in self._courses.items():
             for number, action in enumerate(course.actions, start=course.first):
-                latest: dict[str, int] = {}
-                for resource in conflicts[action.resource]:
-                    for start_ms, end_ms, other, its in users.get(resource, ()):
-                        if other == drone or start_ms >= action.end_ms:
-                            continue
-                        if end_ms > action.start_ms:
-                            raise ConflictingPlansError(
-                                f"{drone} and {other} take conflicting air at {action.start_ms} ms"
-                            )
-                        if latest.get(other, -1) < its:
-                            latest[other] = its
-                if latest:
-                    self._waits[drone, number] = tuple(latest.items())
+                taken = near.get(action.resource)
+                if taken is None:
+                    taken = [users[other] for other in conflicts[action.resource] if other in users]
+                    near[action.resource] = taken
+                if before := _before(action, drone, taken):
+                    self._waits[drone, number] = tuple(before.items())
         self._check_ends(users, conflicts)
 
-    def _check_ends(
-        self, users: Mapping[int, Sequence[tuple[int, int, str, int]]], conflicts: Conflicts
-    ) -> None:
+    def _check_ends(self, users: Mapping[int, Sequence[_Spell]], conflicts: Conflicts) -> None:
         """Nobody passes where another drone stays at the end of its course."""
         for drone, course in self._courses.items():
             last = course.actions[-1] if course.actions else None
@@ -106,26 +102,29 @@ class ActionGraph:
 
     def _topological(self) -> tuple[ActionKey, ...]:
         """Kahn's algorithm."""
-        after: dict[ActionKey, list[ActionKey]] = {}
-        missing: dict[ActionKey, int] = {
-            (drone, number): 0
+        keys = [
+            (drone, number)
             for drone, course in self._courses.items()
             for number in range(course.first, course.first + len(course.actions))
-        }
+        ]
+        places = {key: place for place, key in enumerate(keys)}
+        after: list[list[int]] = [[] for _ in keys]
+        missing = [0] * len(keys)
         for before, then in self.edges():
-            after.setdefault(before, []).append(then)
-            missing[then] += 1
-        ready = [key for key, count in missing.items() if count == 0]
+            place = places[then]
+            after[places[before]].append(place)
+            missing[place] += 1
+        ready = [place for place, count in enumerate(missing) if count == 0]
         order: list[ActionKey] = []
         while ready:
-            key = ready.pop()
-            order.append(key)
-            for then in after.get(key, ()):
-                missing[then] -= 1
-                if missing[then] == 0:
-                    ready.append(then)
-        if len(order) < len(missing):
-            stuck = sorted(drone for drone, number in missing.keys() - set(order))
+            place = ready.pop()
+            order.append(keys[place])
+            for then_at in after[place]:
+                missing[then_at] -= 1
+                if missing[then_at] == 0:
+                    ready.append(then_at)
+        if len(order) < len(keys):
+            stuck = sorted(drone for drone, number in set(keys) - set(order))
             raise CyclicDependenciesError(
                 f"{', '.join(dict.fromkeys(stuck))} wait for each other in a circle"
             )
@@ -158,6 +157,24 @@ class ActionGraph:
             ends[key] = end_ms
             found[drone].append(_at(action, start_ms, end_ms))
         return found
+
+
+def _before(action: Action, drone: str, taken: Iterable[Iterable[_Spell]]) -> dict[str, int]:
+    """Of each other drone the last action before this one among the spells, each list of which rises.
+    ConflictingPlansError."""
+    latest: dict[str, int] = {}
+    start_ms, end_ms = action.start_ms, action.end_ms
+    for spells in taken:
+        for from_ms, to_ms, other, number in spells:
+            if from_ms >= end_ms:
+                break
+            if other == drone:
+                continue
+            if to_ms > start_ms:
+                raise ConflictingPlansError(f"{drone} and {other} take conflicting air at {start_ms} ms")
+            if latest.get(other, -1) < number:
+                latest[other] = number
+    return latest
 
 
 def _at(action: Action, start_ms: int, end_ms: int) -> Action:
