@@ -99,6 +99,31 @@ async def asked(hall: Path, state: Path, *scopes: Scope) -> AsyncIterator[Progra
 
 
 @in_real_time
+async def test_a_program_asks_what_lies_at_places_and_is_told_which_there_are_not(
+    hall: Path, tmp_path: Path
+) -> None:
+    one = {"location": "AL-01-1-1", "reason": "pick was short", "reference": "B-1"}
+    async with asked(hall, tmp_path / "state", Scope.STOCK, Scope.ASK) as program:
+        for _ in range(2):  # an answer may be lost on its way
+            sent = {"site": SITE, "questions": [one, {"location": "AL-09"}]}
+            assert await program.post("/questions", sent) == (200, {"asked": 1, "unknown": ["AL-09"]})
+        (question,) = (await program.page(f"/questions?{_QUERY}"))["rows"]
+        assert {name: question[name] for name in one} == one
+        assert (question["who"], question["answered"]) == ("wms", None)
+        with opened_store(str(tmp_path / "store.db")) as store:
+            assert store.open_places(SITE) == {"AL-01-1-1"}
+        for wrong, why in (
+            ({"site": "hall 9", "questions": [one]}, "hall 9"),
+            ({"site": SITE, "questions": []}, "questions"),
+            ({"site": SITE, "questions": [{"place": "AL-01-1-1"}]}, "place"),
+            ({"site": SITE, "questions": [one | {"reason": "a\nb"}]}, "reason"),
+        ):
+            status, answer = await program.post("/questions", wrong)
+            assert status == 400
+            assert why in answer["refused"]
+
+
+@in_real_time
 async def test_every_endpoint_answers_as_its_document_says(hall: Path, tmp_path: Path) -> None:
     DecisionBook(hall).add("monday", Decision("decision-1", "AL-02-1-1", 5, 4, Decided.FINE, "ann"))
     shutil.copytree(hall / "monday", hall / "tuesday")

@@ -39,7 +39,7 @@ def make(
         list[str] | None,
         typer.Option(
             metavar="SCOPE",
-            help="What it opens, several by several options: stock, pictures, deliver.",
+            help="What it opens, several by several options: stock, pictures, deliver, ask.",
             show_default=False,
         ),
     ] = None,

@@ -32,11 +32,13 @@ class Scope(enum.StrEnum):
     """What a key opens; nothing else does it open."""
 
     STOCK = "stock"
-    """Reads sites, stock, runs, looks, differences, flights, decisions."""
+    """Reads sites, stock, runs, looks, differences, flights, decisions, questions."""
     PICTURES = "pictures"
     """Reads the pictures that are kept as evidence."""
     DELIVER = "deliver"
     """Delivers looks and pictures."""
+    ASK = "ask"
+    """Asks what lies at places now."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -156,6 +156,7 @@ RULES: Mapping[str, Rule] = {
     "GET /api/v1/flights": _READS_STORE,
     "GET /api/v1/decisions": _READS_STORE,
     "GET /api/v1/questions": _READS_STORE,
+    "POST /api/v1/questions": Rule(Role.OPERATOR, Line.ACT, Scope.ASK),
     "GET /api/v1/pictures/{name}": Rule(Role.VIEWER, Line.NONE, Scope.PICTURES),
     "POST /api/v1/deliveries": _DELIVERS,  # the store's own books have each
     "POST /api/v1/deliveries/standings": _DELIVERS,

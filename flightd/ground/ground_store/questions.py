@@ -7,12 +7,13 @@ the looks, as all that is derived of them does, until the answer is told to whoe
 from __future__ import annotations
 
 import hashlib
+import secrets
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 from flightd.ground.drop import Drop
-from flightd.ground.ground_store.engine import Row, Session
+from flightd.ground.ground_store.engine import Row, Session, listed
 
 IS_LOOKED_AT = "question.file = '' AND place.utc_ns > question.utc_ns"
 """Of a question whose answer is there, and not told yet."""
@@ -45,22 +46,36 @@ class Question:
 
 
 def ask(
-    session: Session, site: int, who: str, questions: Sequence[Question], drop: Drop, utc_ns: int
-) -> None:
-    """Of places that the site has, others are left out.  What `who` asked already by the same reference, and
-    what is open, stays as it is.  That it came by a `drop` is noted, until `moved`."""
+    session: Session,
+    site: int,
+    who: str,
+    questions: Sequence[Question],
+    utc_ns: int,
+    drop: Drop | None = None,
+) -> list[str]:
+    """Of places that the site has; returns the codes of the others.  What `who` asked already by the same
+    reference, and what is open, stays as it is.  That it came by a `drop` is noted, until `moved`."""
+    source = f"{drop.inbox}\0{drop.sha256}" if drop else secrets.token_hex()
     session.run_many(
         _ASK,
         [
             (
-                hashlib.sha256(f"{drop.inbox}\0{drop.sha256}\0{utc_ns}\0{number}".encode()).digest(), utc_ns,
+                hashlib.sha256(f"{source}\0{utc_ns}\0{number}".encode()).digest(), utc_ns,
                 who, asked.reason, asked.reference, site, asked.location, who, asked.reference,
             )
             for number, asked in enumerate(questions)
         ],
     )  # fmt: skip
-    moved(session, drop.inbox)
-    session.run("INSERT INTO dropped VALUES (?, ?, ?, ?)", drop.inbox, drop.name, drop.sha256, drop.said)
+    if drop:
+        moved(session, drop.inbox)
+        session.run("INSERT INTO dropped VALUES (?, ?, ?, ?)", drop.inbox, drop.name, drop.sha256, drop.said)
+    codes = list(dict.fromkeys(asked.location for asked in questions))
+    known = {
+        code
+        for marks, part in listed(codes)
+        for (code,) in session.rows(f"SELECT code FROM place WHERE site = ? AND code IN {marks}", site, *part)
+    }
+    return [code for code in codes if code not in known]
 
 
 def dropped(session: Session, inbox: str) -> Drop | None:

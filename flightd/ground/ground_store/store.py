@@ -136,11 +136,11 @@ class GroundStore:
         with self._engine.writing() as session:
             outbox.file_lies_there(session, box, file)
 
-    def ask(self, site: str, who: str, asked: Sequence[Question], drop: Drop) -> None:
+    def ask(self, site: str, who: str, asked: Sequence[Question], drop: Drop | None = None) -> list[str]:
         """As `questions.ask`, of a site that the store knows."""
         with self._engine.writing() as session:
             number = pages.site_id(session, site)
-            questions.ask(session, number, who, asked, drop, self._utc_ns())
+            return questions.ask(session, number, who, asked, self._utc_ns(), drop)
 
     def dropped(self, inbox: str) -> Drop | None:
         """As `questions.dropped`."""

@@ -12,6 +12,8 @@ from flightd.ground.ground_store.store import GroundStore
 
 LIMIT, MOST = 100, 1000
 """Rows of a page."""
+MOST_CHARS, MOST_QUESTIONS = 200, 1000
+"""Of a text that is asked with; of one request."""
 Rows: TypeAlias = list[dict[str, Any]]
 
 

@@ -5,7 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from flightd import __version__
-from flightd.ground.store_api.endpoints import ENDPOINTS, LIMIT, MOST, STATES, Endpoint, Parameter
+from flightd.ground.store_api.endpoints import (
+    ENDPOINTS,
+    LIMIT,
+    MOST,
+    MOST_CHARS,
+    MOST_QUESTIONS,
+    STATES,
+    Endpoint,
+    Parameter,
+)
 from flightd.inventory.count_change import CountChange
 
 _KINDS: dict[str, dict[str, Any]] = {
@@ -45,7 +54,7 @@ _PARAMETERS: dict[str, dict[str, Any]] = {
     "number": {"type": "integer", "minimum": 1, "maximum": MOST, "default": LIMIT},
 }
 _REFUSALS = {
-    "400": "A parameter is wrong.",
+    "400": "A parameter, or what is sent, is wrong.",
     "401": "No key, or one that is nobody's.",
     "403": "The key has not the scope.",
     "404": "The store knows no such site, run or place.",
@@ -71,6 +80,7 @@ def document() -> dict[str, Any]:
             "responses": {"200": {"description": "The JPEG.", "content": {"image/jpeg": {}}}, **_refused()},
         }
     }
+    paths["/questions"]["post"] = _asking()
     return {
         "openapi": "3.1.0",
         "info": {"title": "flightd ground store", "version": __version__},
@@ -107,6 +117,38 @@ def _operation(endpoint: Endpoint) -> dict[str, Any]:
         "summary": endpoint.summary,
         "parameters": [_parameter(parameter) for parameter in endpoint.parameters],
         "responses": {"200": answer, **_refused()},
+    }
+
+
+def _asking() -> dict[str, Any]:
+    """What a program asks of places."""
+    text = {"type": "string", "maxLength": MOST_CHARS}
+    one = {
+        "type": "object",
+        "required": ["location"],
+        "additionalProperties": False,
+        "properties": {"location": text, "reason": text, "reference": text},
+    }
+    new = {
+        "type": "object",
+        "required": ["site", "questions"],
+        "additionalProperties": False,
+        "properties": {
+            "site": text,
+            "questions": {"type": "array", "items": one, "minItems": 1, "maxItems": MOST_QUESTIONS},
+        },
+    }
+    told = {
+        "type": "object",
+        "required": ["asked", "unknown"],
+        "properties": {"asked": {"type": "integer"}, "unknown": _KINDS["texts"]},
+    }
+    answer = {"description": "How many are asked, and which places the store does not know."}
+    return {
+        "operationId": "ask",
+        "summary": "Ask what lies at places now; what is open by the same reference stays as it is.",
+        "requestBody": {"required": True, "content": {"application/json": {"schema": new}}},
+        "responses": {"200": answer | {"content": {"application/json": {"schema": told}}}, **_refused()},
     }
 
 

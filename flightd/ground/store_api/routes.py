@@ -14,18 +14,30 @@ from starlette.routing import BaseRoute, Route
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState
 from flightd.core.utc_time import utc_text
+from flightd.ground.access.gate import identity_of, note_act
 from flightd.ground.bounded import Threads
 from flightd.ground.ground_store.batch import MOST_BATCH_BYTES, Batch
 from flightd.ground.ground_store.pages import Mark
+from flightd.ground.ground_store.questions import Question
 from flightd.ground.ground_store.store import GroundStore
 from flightd.ground.json_http import AnswerTo, as_json, json_body, or_refused, refusal, said
-from flightd.ground.store_api.endpoints import ENDPOINTS, LIMIT, MOST, STATES, Endpoint, Parameter, mark_of
+from flightd.ground.store_api.endpoints import (
+    ENDPOINTS,
+    LIMIT,
+    MOST,
+    MOST_CHARS,
+    MOST_QUESTIONS,
+    STATES,
+    Endpoint,
+    Parameter,
+    mark_of,
+)
 from flightd.ground.store_api.openapi import document
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES
 
 PREFIX = "/api/v1"
 _AT_ONCE, _MOST_WAITING = 3, 32
-_MOST_CHARS = 200
+_MOST_QUESTION_BYTES = 1 << 20
 _Names = Annotated[list[Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]], Meta(max_length=1000)]
 
 
@@ -33,6 +45,24 @@ class Asked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Of which looks, or pictures, is asked."""
 
     names: _Names
+
+
+_Text = Annotated[str, Meta(max_length=MOST_CHARS, pattern=r"^[^\x00-\x1f]*\Z")]
+
+
+class AskedOf(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A place, and why somebody wants to know what lies there; the reference is the asker's own."""
+
+    location: _Text
+    reason: _Text = ""
+    reference: _Text = ""
+
+
+class NewQuestions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Of places of a site."""
+
+    site: _Text
+    questions: Annotated[list[AskedOf], Meta(min_length=1, max_length=MOST_QUESTIONS)]
 
 
 def store_routes(store: GroundStore | None) -> list[BaseRoute]:
@@ -51,10 +81,20 @@ def store_routes(store: GroundStore | None) -> list[BaseRoute]:
             jpeg, headers={"Cache-Control": "private, immutable, max-age=86400"}, media_type="image/jpeg"
         )
 
+    async def ask(request: Request) -> Response:
+        new = await said(request, NewQuestions, "questions", _MOST_QUESTION_BYTES)
+        questions = [Question(one.location, one.reason, one.reference) for one in new.questions]
+        who = identity_of(request).name
+        unknown = await threads.run(store.ask, new.site, who, questions)
+        asked = sum(one.location not in unknown for one in questions)
+        note_act(request, f"asked {asked} of {new.site}")
+        return as_json({"asked": asked, "unknown": unknown})
+
     return [
         Route(f"{PREFIX}/openapi.json", openapi, methods=["GET"]),
         *(Route(PREFIX + one.path, _answer(store, threads, one), methods=["GET"]) for one in ENDPOINTS),
         Route(f"{PREFIX}/pictures/{{name}}", or_refused(picture), methods=["GET"]),
+        Route(f"{PREFIX}/questions", or_refused(ask), methods=["POST"]),
         *_delivery_routes(store, threads),
     ]
 
@@ -117,8 +157,8 @@ def read_parameters(endpoint: Endpoint, given: list[tuple[str, str]]) -> dict[st
             raise InputError(f"there is no parameter {name!r}", remedy=f"known: {', '.join(known) or 'none'}")
         if found[name] is not None:
             raise InputError("given twice", key=name)
-        if len(text) > _MOST_CHARS or "\0" in text:
-            raise InputError(f"expected up to {_MOST_CHARS} characters", key=name)
+        if len(text) > MOST_CHARS or "\0" in text:
+            raise InputError(f"expected up to {MOST_CHARS} characters", key=name)
         found[name] = _read(known[name], text)
     if "limit" in known and found["limit"] is None:
         found["limit"] = LIMIT
