@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from tests.rigs.patience import COMMAND_S
 from tests.rigs.small_camera import at_once
 
 ROOT = Path(__file__).parents[3]
@@ -22,7 +23,7 @@ def flown(folder: Path) -> dict[str, Any]:
         cwd=ROOT,
         capture_output=True,
         text=True,
-        timeout=280,
+        timeout=COMMAND_S,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -22,6 +22,7 @@ from flightd.core.snapshot import Snapshot
 from flightd.core.types import Phase
 from flightd.sim.scenario.scenario import Scenario
 from tests.command import Command
+from tests.rigs.patience import COMMAND_S
 from tests.rigs.recorded_flight import fly_once
 from tests.rigs.small_camera import AT_ONCE, with_small_camera
 
@@ -31,7 +32,7 @@ WALL = {"wall_time_s"}
 
 def process(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "flightd", *arguments]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=280, check=False)
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=COMMAND_S, check=False)
 
 
 def test_the_same_seed_flies_the_same_flight(recorded_flight: Path, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement
 from tests.rigs.event_loops import real
+from tests.rigs.patience import COMMAND_S
 from tests.rigs.small_camera import at_once, small_camera_file
 from tests.rigs.vehicles import Rig
 
@@ -41,7 +42,7 @@ def flown(folder: Path, *options: str) -> dict[str, Any]:
         str(folder),
         *options,
     ]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=280, check=False)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=COMMAND_S, check=False)
     assert done.returncode == 0, done.stderr
     summary: dict[str, Any] = json.loads(done.stdout)
     return summary

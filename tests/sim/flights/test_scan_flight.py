@@ -13,6 +13,7 @@ import pytest
 
 from flightd.adapters.store.sqlite import SqliteStore
 from tests.command import Command
+from tests.rigs.patience import COMMAND_S
 from tests.rigs.small_camera import at_once, small_camera_file
 
 ROOT = Path(__file__).parents[3]
@@ -30,7 +31,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
         *at_once(),
     )
     command = [sys.executable, "-m", "flightd", "sim", *where, *small, "--seed", "3", "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=290, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=COMMAND_S, check=False)
     assert done.returncode == 0, done.stderr
     return out
 

@@ -7,12 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.rigs.patience import COMMAND_S
+
 ROOT = Path(__file__).parents[3]
 
 
 def test_killed_at_random_moments_of_a_sweep_nothing_booked_is_lost_or_counted_twice(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "tests.unit.mission.kill_a_sweep", "5", "3", str(tmp_path / "store")]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=250)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=COMMAND_S)
     result = json.loads(done.stdout)
     assert result["kills"] == 5
     never = ("lost", "double", "again", "stood", "once", "unsound")

@@ -31,6 +31,7 @@ from flightd.core.inventory import (
 from flightd.core.types import CodeRead
 from flightd.ports import Store
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
+from tests.rigs.patience import COMMAND_S
 from tests.unit.store.kill_at_random import look
 
 ROOT = Path(__file__).parents[3]
@@ -219,7 +220,7 @@ def test_half_written_pictures_are_swept_at_the_start(tmp_path: Path) -> None:
 
 def test_killed_at_random_moments_nothing_reported_is_lost(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "tests.unit.store.kill_at_random", "30", "5", str(tmp_path / "store")]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=250)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=COMMAND_S)
     result = json.loads(done.stdout)
     assert (result["kills"], result["lost"], result["unsound"]) == (30, 0, 0)
     assert result["commits"] > 0
