@@ -45,13 +45,13 @@ class Noted:
     def __init__(self, session: Session, site: str, utc_ns: int) -> None:
         self._session = session
         self._site = site
-        self._utc_ns = utc_ns
+        self.utc_ns = utc_ns
         self._rows: list[tuple[int, str, str]] = []
         self.wanted = bool(session.rows("SELECT 1 FROM hook LIMIT 1"))
 
     def note(self, kind: EventKind, body: Mapping[str, object]) -> None:
         if self.wanted:
-            self._rows.append((self._utc_ns, kind.value, json.dumps({"site": self._site, **body})))
+            self._rows.append((self.utc_ns, kind.value, json.dumps({"site": self._site, **body})))
 
     def write(self) -> None:
         """At the end of the transaction."""

@@ -4,7 +4,7 @@ found printed only grows.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from flightd.core.inventory import Observation, Standing
@@ -102,48 +102,63 @@ def _take_decisions(session: Session, site: int, decisions: Sequence[SentDecisio
 
 
 def _take_looks(engine: Engine, session: Session, site: int, batch: Batch, noted: Noted) -> Taken:
-    looks = batch.looks
-    nodes = {place.code: place.node for place in batch.places}
-    for look in looks:
-        pose = look.observation.pose
-        nodes.setdefault(look.observation.location, pose.node if pose else "")
-    places = _places(session, site, nodes)
+    sent = _unique(batch.looks)
+    kept = _kept(session, sent)
+    new = {identity: look for identity, look in sent.items() if identity not in kept}
+    risen = {
+        identity: sent[identity] for identity in kept if sent[identity].standing > kept[identity].standing
+    }
+    printed = {identity: printed_text(look.observation.texts) for identity, look in sent.items()}
+    fuller = [identity for identity in kept if says_more(printed[identity], kept[identity].printed)]
+    printed |= {identity: kept[identity].printed for identity in kept.keys() - set(fuller)}
+    places = _places(session, site, _nodes(batch, new.values()))
     _follow_plan(session, places, batch)
-    unique: dict[str, SentLook] = {}
-    for look in looks:
-        known = unique.get(look.observation.id)
-        if known is None or look.standing > known.standing:
-            unique[look.observation.id] = look
-    kept = _kept(session, unique.values())
-    new = [look for identity, look in unique.items() if bytes.fromhex(identity) not in kept]
-    risen, fuller = [], []
-    printed = {identity: printed_text(look.observation.texts) for identity, look in unique.items()}
-    for identity, look in unique.items():
-        standing, before = kept.get(bytes.fromhex(identity), (Standing.WITHDRAWN, printed[identity]))
-        if look.standing > standing:
-            risen.append(look)
-        if says_more(printed[identity], before):
-            fuller.append(look.observation)
-        else:
-            printed[identity] = before
-    runs = _runs(session, site, [look.observation for look in new], noted)
-    engine.make_room(session, {look.observation.utc_ns for look in new})
-    session.run_many(_LOOK, [_row(look, places, runs) for look in new])
+    runs = _runs(session, site, [look.observation for look in new.values()], noted)
+    where = {identity: (before.place, before.run) for identity, before in kept.items()}
+    for identity, look in new.items():
+        where[identity] = places[look.observation.location], runs[look.observation.run]
+    engine.make_room(session, {look.observation.utc_ns for look in new.values()})
+    session.run_many(_LOOK, [_row(identity, look, *where[identity]) for identity, look in new.items()])
     session.run_many(
         "UPDATE observation SET standing = ? WHERE id = ? AND utc_ns = ?",
-        [(int(look.standing), bytes.fromhex(look.observation.id), look.observation.utc_ns) for look in risen],
+        [(int(one.standing), bytes.fromhex(of), one.observation.utc_ns) for of, one in risen.items()],
     )
     session.run_many(
         "UPDATE observation SET printed = ? WHERE id = ? AND utc_ns = ?",
-        [(printed[seen.id], bytes.fromhex(seen.id), seen.utc_ns) for seen in fuller],
+        [(printed[of], bytes.fromhex(of), sent[of].observation.utc_ns) for of in fuller],
     )
     session.run_many(
         "UPDATE place SET printed = ? WHERE id = ? AND look = ?",
-        [(printed[seen.id], places[seen.location], bytes.fromhex(seen.id)) for seen in fuller],
+        [(printed[of], where[of][0], bytes.fromhex(of)) for of in fuller],
     )
-    runs |= _run_ids(session, site, {look.observation.run for look in risen})
-    renew(session, _touched([*new, *risen], places, runs, printed), noted)
-    return Taken(len(new), len({look.observation.id for look in risen} | {seen.id for seen in fuller}))
+    by_site = {site: dict(new)}
+    for identity, look in risen.items():
+        by_site.setdefault(kept[identity].site, {})[identity] = look
+    for number, looks in by_site.items():
+        told = noted if number == site else Noted(session, _site_name(session, number), noted.utc_ns)
+        renew(session, _touched(looks, where, printed), told)
+        if told is not noted:
+            told.write()
+    return Taken(len(new), len(risen.keys() | set(fuller)))
+
+
+def _unique(looks: Iterable[SentLook]) -> dict[str, SentLook]:
+    """Each by its id, as it stands highest."""
+    unique: dict[str, SentLook] = {}
+    for look in looks:
+        known = unique.setdefault(identity := look.observation.id, look)
+        if look.standing > known.standing:
+            unique[identity] = look
+    return unique
+
+
+def _nodes(batch: Batch, new: Iterable[SentLook]) -> dict[str, str]:
+    """The places that the batch makes known, each with its node."""
+    nodes = {place.code: place.node for place in batch.places}
+    for look in new:
+        pose = look.observation.pose
+        nodes.setdefault(look.observation.location, pose.node if pose else "")
+    return nodes
 
 
 def _follow_plan(session: Session, places: dict[str, int], batch: Batch) -> None:
@@ -162,6 +177,10 @@ def _follow_plan(session: Session, places: dict[str, int], batch: Batch) -> None
 def _site(session: Session, name: str) -> int:
     session.run("INSERT INTO site (name) VALUES (?) ON CONFLICT DO NOTHING", name)
     return int(session.rows("SELECT id FROM site WHERE name = ?", name)[0][0])
+
+
+def _site_name(session: Session, site: int) -> str:
+    return str(session.rows("SELECT name FROM site WHERE id = ?", site)[0][0])
 
 
 def _places(session: Session, site: int, nodes: dict[str, str]) -> dict[str, int]:
@@ -185,19 +204,31 @@ def _place_ids(session: Session, site: int, codes: Sequence[str]) -> dict[str, i
     return found
 
 
-def _kept(session: Session, looks: Iterable[SentLook]) -> dict[bytes, tuple[int, str]]:
-    """Those that the store has already, with their standing there, and what was found printed."""
-    sent = list(looks)
-    times = [look.observation.utc_ns for look in sent]
-    kept: dict[bytes, tuple[int, str]] = {}
-    for marks, part in listed([bytes.fromhex(look.observation.id) for look in sent]):
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """How the store has a look, and where: the site that it came first as, whatever a batch says later."""
+
+    standing: int
+    printed: str
+    place: int
+    run: int
+    site: int
+
+
+def _kept(session: Session, sent: Mapping[str, SentLook]) -> dict[str, _Kept]:
+    """Those that the store has already."""
+    times = [look.observation.utc_ns for look in sent.values()]
+    kept: dict[str, _Kept] = {}
+    for marks, part in listed([bytes.fromhex(identity) for identity in sent]):
         rows = session.rows(
-            f"SELECT id, standing, printed FROM observation WHERE id IN {marks} AND utc_ns BETWEEN ? AND ?",
+            "SELECT seen.id, seen.standing, seen.printed, seen.place, seen.run, place.site"
+            " FROM observation AS seen JOIN place ON place.id = seen.place"
+            f" WHERE seen.id IN {marks} AND seen.utc_ns BETWEEN ? AND ?",
             *part,
             min(times),
             max(times),
         )
-        kept |= {identity: (standing, printed) for identity, standing, printed in rows}
+        kept |= {identity.hex(): _Kept(*told) for identity, *told in rows}
     return kept
 
 
@@ -234,12 +265,12 @@ def _run_ids(session: Session, site: int, names: set[str]) -> dict[str, int]:
     return found
 
 
-def _row(look: SentLook, places: dict[str, int], runs: dict[str, int]) -> tuple[object, ...]:
+def _row(identity: str, look: SentLook, place: int, run: int) -> tuple[object, ...]:
     seen = look.observation
     pose = seen.pose
     where = (pose.node, pose.x_m, pose.y_m, pose.height_m, pose.yaw_rad) if pose else (None,) * 5
     return (
-        bytes.fromhex(seen.id), seen.utc_ns, places[seen.location], runs[seen.run], seen.state.value,
+        bytes.fromhex(identity), seen.utc_ns, place, run, seen.state.value,
         float(seen.confidence), int(look.standing), *where, bytes.fromhex(seen.evidence) or None,
         reads_text(seen.reads), fill_text(seen.fill), undecided_text(seen.undecided),
         printed_text(seen.texts), int(seen.again),
@@ -247,20 +278,20 @@ def _row(look: SentLook, places: dict[str, int], runs: dict[str, int]) -> tuple[
 
 
 def _touched(
-    looks: Sequence[SentLook], places: dict[str, int], runs: dict[str, int], printed: dict[str, str]
+    looks: Mapping[str, SentLook], where: Mapping[str, tuple[int, int]], printed: Mapping[str, str]
 ) -> list[Touched]:
-    """The places at which something counts that did not, or no longer."""
+    """The places at which something counts that did not, or no longer; `where` has place and run of each."""
     found: dict[int, Touched] = {}
-    for look in looks:
+    for identity, look in looks.items():
         seen = look.observation
         if look.standing is not Standing.PENDING:
-            place = places[seen.location]
+            place, run = where[identity]
             touched = found.setdefault(place, Touched(place, seen.location))
             touched.add(
                 Moment(
-                    seen.utc_ns, bytes.fromhex(seen.id), runs[seen.run], seen.state.value,
+                    seen.utc_ns, bytes.fromhex(identity), run, seen.state.value,
                     reads_text(seen.reads), seen.confidence, bytes.fromhex(seen.evidence) or None,
-                    fill_text(seen.fill), undecided_text(seen.undecided), printed[seen.id],
+                    fill_text(seen.fill), undecided_text(seen.undecided), printed[identity],
                 ),
                 counts=look.standing is Standing.CONFIRMED,
             )  # fmt: skip

@@ -198,6 +198,37 @@ def test_a_standing_only_rises(store: GroundStore) -> None:
     }
 
 
+@pytest.mark.parametrize("namesake", [False, True])
+def test_a_look_that_comes_again_as_of_another_site_rises_where_it_came_first(
+    store: GroundStore, namesake: bool
+) -> None:
+    """Whether the other site has a place and a run of the same names or not."""
+    store.waiting_events("wms", 1)
+    lot = LabelValue(ValueKind.LOT, "B1", "", ValueSource.TEXT, 0.95)
+    first = look("A-1", "PAL-1", at_ns=_BEGIN - _DAY, run="sunday")
+    pending = look("A-1", standing=Standing.PENDING)
+    told = replace(pending.observation, texts=(lot,))
+    store.take(batch(first, pending))
+    if namesake:
+        store.take(batch(look("A-1", "PAL-9", at_ns=_BEGIN - _DAY), site="hall 4"))
+    theirs = store.take(batch(SentLook(told, Standing.CONFIRMED), look("B-1"), site="hall 4"))
+    assert (theirs.new, theirs.changed, theirs.already) == (1, 1, 0)
+    assert places_of(store) == {"A-1": ("empty", [], "monday")}
+    assert [one["value"] for one in store.stock(SITE)[0]["printed"]] == ["B1"]
+    assert [one["change"] for one in store.differences(SITE, "monday")] == ["gone"]
+    own = {"A-1": "read"} if namesake else {}
+    stands = {row["location"]: row["state"] for row in store.stock("hall 4")}
+    assert stands == {"B-1": "empty"} | own
+    assert store.differences("hall 4", "monday") == []
+    assert store.counts()["looks"] == 3 + namesake
+    withdrawn = store.take(batch(SentLook(told, Standing.WITHDRAWN), site="hall 4"))
+    assert (withdrawn.new, withdrawn.changed) == (0, 1)
+    assert places_of(store) == {"A-1": ("read", ["PAL-1"], "sunday")}
+    waiting, _ = store.waiting_events("wms", 20)
+    sites = [(one.kind, one.body["site"]) for one in waiting if one.kind.startswith("difference")]
+    assert sites == [("difference.found", SITE), ("difference.gone", SITE)]
+
+
 def test_a_run_differs_where_the_count_before_it_said_otherwise(store: GroundStore) -> None:
     before = [look("A-1", "PAL-1"), look("A-2"), look("A-3", "PAL-3"), look("A-4", "x-4"), look("A-5", "5")]
     after = [
