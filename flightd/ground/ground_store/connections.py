@@ -18,10 +18,18 @@ C = TypeVar("C", bound=_Closable)
 
 
 class Connections(Generic[C]):
-    """At most `most` at a time, made by `connect` as they are needed; who comes on top waits."""
+    """At most `most` at a time, made by `connect` as they are needed; who comes on top waits.  One that was
+    idle is handed out where it `is_alive`."""
 
-    def __init__(self, connect: Callable[[], C], most: int, wait_s: float) -> None:
+    def __init__(
+        self,
+        connect: Callable[[], C],
+        most: int,
+        wait_s: float,
+        is_alive: Callable[[C], bool] = lambda _: True,
+    ) -> None:
         self._connect = connect
+        self._is_alive = is_alive
         self._wait_s = wait_s
         self._room = threading.BoundedSemaphore(most)
         self._lock = threading.Lock()
@@ -35,10 +43,7 @@ class Connections(Generic[C]):
         if not self._room.acquire(timeout=self._wait_s):
             raise UnavailableError("too many questions to the store wait already", remedy="try again")
         try:
-            with self._lock:
-                connection = self._idle.pop() if self._idle else None
-            if connection is None:
-                connection = self._connect()
+            connection = self._idle_one() or self._connect()
             try:
                 yield connection
             except BaseException:
@@ -53,6 +58,16 @@ class Connections(Generic[C]):
         with self._lock:
             self._closed, idle, self._idle = True, self._idle, []
         for connection in idle:
+            connection.close()
+
+    def _idle_one(self) -> C | None:
+        while True:
+            with self._lock:
+                if not self._idle:
+                    return None
+                connection = self._idle.pop()
+            if self._is_alive(connection):
+                return connection
             connection.close()
 
     def _take_back(self, connection: C) -> None:

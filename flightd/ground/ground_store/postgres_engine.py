@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import math
+import select
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, cast
 
 import psycopg
+from psycopg.abc import RV, PQGen
 from psycopg.conninfo import conninfo_to_dict
 
 from flightd.core.errors import InputError, UnavailableError
@@ -22,6 +26,12 @@ _WAIT_S = 10.0
 _CONNECT_S = 5
 _READ_S = 60
 """At most for one question; any page takes parts of a second."""
+_WRITE_S = 60
+"""At most for one statement, and between two: who hangs there keeps everybody from writing."""
+_TURN_S = 20
+"""At most until others have done.  Who delivers to a station waits for its answer for 30 s."""
+_SILENT_S = 15
+"""Beyond that, after which a server is given up that hangs and cannot say so."""
 _HOST_GONE = {
     "keepalives": 1, "keepalives_idle": 10, "keepalives_interval": 5, "keepalives_count": 3,
     "tcp_user_timeout": 15_000,
@@ -32,10 +42,32 @@ _NS = 1_000_000_000
 _OPTIONS = f"-c search_path={_SCHEMA} -c client_min_messages=warning"
 
 
+class BoundedConnection(psycopg.Connection[Row]):
+    """Is closed where one answer takes more than `most_s`: a server that hangs keeps its network alive, and
+    its own limits hang with it."""
+
+    most_s = math.inf
+
+    def wait(self, gen: PQGen[RV], *args: Any, **more: Any) -> RV:
+        return super().wait(self._bounded(gen), *args, **more)
+
+    def _bounded(self, gen: PQGen[RV]) -> PQGen[RV]:
+        until_s = time.monotonic() + self.most_s
+        try:
+            asked = next(gen)
+            while True:
+                asked = gen.send((yield asked))
+                if time.monotonic() > until_s:
+                    self.close()
+                    raise psycopg.OperationalError(f"nothing for {self.most_s:.0f} s: it hangs")
+        except StopIteration as end:
+            return cast("RV", end.value)
+
+
 class PostgresSession:
     """A transaction of a connection."""
 
-    def __init__(self, connection: psycopg.Connection[Row]) -> None:
+    def __init__(self, connection: BoundedConnection) -> None:
         self.connection = connection
 
     def rows(self, sql: str, *values: object) -> list[Row]:
@@ -67,36 +99,47 @@ class PostgresEngine:
                 "not a URL of PostgreSQL", key="--store", remedy="give postgresql://USER@HOST/DATABASE"
             ) from None
         self.shown = f"postgresql://{parts.get('host') or ''}/{parts.get('dbname') or ''}"
-        self._connections: Connections[psycopg.Connection[Row]] = Connections(
-            self._connected, _CONNECTIONS, _WAIT_S
+        self._connections: Connections[BoundedConnection] = Connections(
+            self._connected, _CONNECTIONS, _WAIT_S, _is_alive
         )
 
-    def _connected(self) -> psycopg.Connection[Row]:
+    def _connected(self) -> BoundedConnection:
         asked = conninfo_to_dict(self._url)
         given: dict[str, Any] = {"connect_timeout": _CONNECT_S, "application_name": "flightd"}
         given |= {name: value for name, value in _HOST_GONE.items() if name not in asked}
         given["options"] = f"{asked.get('options') or ''} {_OPTIONS}".strip()
-        return psycopg.connect(self._url, autocommit=True, **given)
+        return BoundedConnection.connect(self._url, autocommit=True, **given)
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
-        with self._session("BEGIN") as session:
+        limits = {
+            "statement_timeout": _WRITE_S,
+            "lock_timeout": _TURN_S,
+            "idle_in_transaction_session_timeout": _WRITE_S,
+        }
+        with self._session("BEGIN", limits) as session:
             session.run("SELECT pg_advisory_xact_lock(?)", _WRITER)
             yield session
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
         begin = "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"
-        with self._session(f"{begin}; SET LOCAL statement_timeout = '{_READ_S}s'") as session:
+        with self._session(begin, {"statement_timeout": _READ_S}) as session:
             yield session
 
     @contextmanager
-    def _session(self, begin: str) -> Iterator[PostgresSession]:
+    def _session(self, begin: str, limits_s: Mapping[str, float]) -> Iterator[PostgresSession]:
+        limits = "".join(f"; SET LOCAL {name} = '{round(s * 1000)}ms'" for name, s in limits_s.items())
         try:
             with self._connections.one() as connection:
-                connection.execute(begin)
+                connection.most_s = limits_s["statement_timeout"] + _SILENT_S
+                connection.execute(begin + limits)
                 yield PostgresSession(connection)  # where it raises, the connection is closed: rolled back
                 connection.execute("COMMIT")
+        except psycopg.errors.LockNotAvailable as err:
+            raise UnavailableError(
+                f"others have kept the store locked for {_TURN_S} s", file=self.shown, remedy="try again"
+            ) from err
         except psycopg.Error as err:
             text = str(err).strip().partition("\n")[0] or type(err).__name__
             raise UnavailableError(f"the store answers: {text}", file=self.shown) from err
@@ -112,6 +155,10 @@ class PostgresEngine:
         session.run("INSERT INTO version VALUES (?)", version)
 
     def script(self, session: Session, text: str) -> None:
+        """However long it takes: the tables of years are brought up to date at once or not at all."""
+        session.run("SET LOCAL statement_timeout = 0")
+        if isinstance(session, PostgresSession):
+            session.connection.most_s = math.inf
         session.run(text)
 
     def make_room(self, session: Session, utc_ns: Iterable[int]) -> None:
@@ -127,6 +174,13 @@ class PostgresEngine:
 
     def close(self) -> None:
         self._connections.close()
+
+
+def _is_alive(connection: BoundedConnection) -> bool:
+    """Nothing came from its server while nobody asked: that would be its end, or why it ended."""
+    heard = select.poll()
+    heard.register(connection.fileno(), select.POLLIN)
+    return not heard.poll(0)
 
 
 def _psycopg(sql: str) -> Any:
