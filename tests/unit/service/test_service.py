@@ -131,8 +131,12 @@ def test_a_delivery_yields_to_everything_and_waits_for_its_file() -> None:
     assert {"CPUSchedulingPolicy=idle", "IOSchedulingClass=idle", "Nice=19", "CPUWeight=1"} <= found
     assert "ConditionPathExists=/etc/flightd/deliver.env" in found
     assert "EnvironmentFile=/etc/flightd/deliver.env" in found
-    assert any(line.endswith(" TMPDIR=/var/tmp") for line in found), "a copy of the inventory, on the disk"
     assert "WantedBy=timers.target" in settings(DELIVER_UNIT.with_suffix(".timer"))
+
+
+@pytest.mark.parametrize("unit", [GROUND_UNIT, DELIVER_UNIT], ids=lambda unit: unit.stem)
+def test_who_copies_inventories_copies_them_to_the_disk(unit: Path) -> None:
+    assert any(line.endswith(" TMPDIR=/var/tmp") for line in settings(unit))
 
 
 def test_the_units_words_deliver_and_prune_but_not_while_the_daemon_is_armed(tmp_path: Path) -> None:
@@ -147,19 +151,17 @@ def test_the_units_words_deliver_and_prune_but_not_while_the_daemon_is_armed(tmp
         "/var/lib/flightd": tmp_path / "drone",
     }
 
-    def run(**more: str) -> list[str]:
+    def run(exit_code: int = 0, **more: str) -> list[str]:
         environment = {**os.environ, "FLIGHTD_STORE": str(tmp_path / "counts.db"), **more}
-        said = []
-        for line in DELIVER_UNIT.read_text().splitlines():
-            if line.startswith("ExecStart="):
-                for name, path in places.items():
-                    line = line.replace(name, str(path))  # noqa: PLW2901
-                ended = subprocess.run(
-                    shlex.split(line.partition("=")[2]), capture_output=True, text=True, check=True,
-                    env=environment, cwd=SYSTEMD.parent,
-                )  # fmt: skip
-                said += ended.stdout.splitlines()
-        return said
+        (line,) = (line for line in DELIVER_UNIT.read_text().splitlines() if line.startswith("ExecStart="))
+        for name, path in places.items():
+            line = line.replace(name, str(path))
+        ended = subprocess.run(
+            shlex.split(line.partition("=")[2]), capture_output=True, text=True, check=False,
+            env=environment, cwd=SYSTEMD.parent,
+        )  # fmt: skip
+        assert ended.returncode == exit_code, ended.stderr
+        return ended.stdout.splitlines()
 
     mark.touch()
     assert run()[-1] == f"{mark}: a flight is on, what is left is for later"
@@ -168,9 +170,16 @@ def test_the_units_words_deliver_and_prune_but_not_while_the_daemon_is_armed(tmp
     assert line.startswith("10 looks delivered")
     with opened_store(str(tmp_path / "counts.db")) as store:
         assert [site["site"] for site in store.sites()] == [RACKS.name]
-    line, pruned = run(FLIGHTD_PRUNE=str(tmp_path / "drone" / "inventory"))
+    counted = str(tmp_path / "drone" / "inventory")
+    broken = tmp_path / "drone" / "broken" / "inventory.db"
+    broken.parent.mkdir()
+    broken.write_bytes(b"no database at all, but long enough " * 50)
+    line, pruned = run(exit_code=1, FLIGHTD_PRUNE=counted)
     assert line.startswith("0 looks delivered")
-    assert pruned.endswith("pictures taken away")
+    assert pruned.startswith("1 looks and 0 pictures taken away")
+    broken.unlink()
+    assert len(run(FLIGHTD_PRUNE=counted)) == 2
+    assert len(run(exit_code=2, FLIGHTD_PRUNE=str(tmp_path))) == 1, "there is no inventory"
 
 
 def daemons_folder(folder: Path) -> None:
