@@ -29,6 +29,7 @@ from flightd.ground.ground_store.batch import (
     SentLook,
 )
 from flightd.ground.ground_store.reads_text import NOTHING_PRINTED, printed_text, says_more
+from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, picture_name
 
 _AROUND_BYTES = 1 << 16
 """Of a batch, what is not its items."""
@@ -112,8 +113,9 @@ def deliver_inventory(folder: Path, site: str, source: str, target: Target, done
         for part in inventory.parts(MOST_LOOKS):
             missing = lacking(part, target)
             done.already += len(part) - len(missing)
-            done.pictures += _keep_pictures(inventory, missing, target)
-            for looks in _parts([SentLook(*look) for look in inventory.loaded(missing)]):
+            unread = _keep_pictures(inventory, missing, target, done)
+            ready = [look for look in missing if look.evidence not in unread]
+            for looks in _parts([SentLook(*look) for look in inventory.loaded(ready)]):
                 done.add(target.take(Batch(site, source, looks=tuple(looks))))
 
 
@@ -131,16 +133,30 @@ def lacking(looks: Sequence[KeptLook], target: Target) -> list[KeptLook]:
     ]
 
 
-def _keep_pictures(inventory: SqliteStore, looks: Sequence[KeptLook], target: Target) -> int:
-    """Before the looks that name them; a picture that the sender has no longer is not waited for."""
+def _keep_pictures(
+    inventory: SqliteStore, looks: Sequence[KeptLook], target: Target, done: Delivered
+) -> set[str]:
+    """Before the looks that name them.  Returns those that cannot be read now: for their looks it is too
+    early.  A picture that the sender has no longer, or that is damaged, is not waited for."""
     names = {look.evidence for look in looks if look.evidence}
-    sent = 0
+    unread: set[str] = set()
     for name in missing_pictures(names, target):
         path = inventory.evidence.path(name)
-        if path.is_file():
-            target.keep_picture(path.read_bytes())
-            sent += 1
-    return sent
+        try:
+            with path.open("rb") as stream:
+                jpeg = stream.read(MOST_BYTES + 1)
+        except FileNotFoundError:
+            continue
+        except OSError as err:
+            done.failures.append(f"{path}: {err.strerror or err}; its look waits for it")
+            unread.add(name)
+            continue
+        if len(jpeg) > MOST_BYTES or picture_name(jpeg) != name:
+            done.failures.append(f"{path}: the picture is damaged; its look is delivered without it")
+            continue
+        target.keep_picture(jpeg)
+        done.pictures += 1
+    return unread
 
 
 def missing_pictures(names: Iterable[str], target: Target) -> Iterator[str]:

@@ -436,6 +436,38 @@ def test_only_what_the_store_has_is_pruned(store: GroundStore, tmp_path: Path) -
     assert store.counts()["looks"] == 25
 
 
+def test_one_picture_that_is_damaged_or_cannot_be_read_keeps_no_other_look_back(
+    store: GroundStore, tmp_path: Path
+) -> None:
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for number in range(12):
+            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
+        looks = [look for look, _ in inventory.looks()]
+    zeroed, large, unread, gone = (inventory.evidence.path(look.evidence) for look in looks[:4])
+    zeroed.write_bytes(bytes(20))  # what a worn card makes of it
+    large.write_bytes(bytes(60_000))
+    unread.unlink()
+    unread.mkdir()
+    gone.unlink()
+    done = Delivered()
+    deliver_inventory(inventory.folder, SITE, "north", store, done)
+    assert sorted(done.failures) == sorted(
+        [
+            *(
+                f"{path}: the picture is damaged; its look is delivered without it"
+                for path in (zeroed, large)
+            ),
+            f"{unread}: Is a directory; its look waits for it",
+        ]
+    )
+    assert (done.looks, done.pictures) == (11, 8)
+    unread.rmdir()
+    unread.write_bytes(b"\xff\xd82")
+    again = Delivered()
+    deliver_inventory(inventory.folder, SITE, "north", store, again)
+    assert (again.looks, again.pictures, again.failures) == (1, 1, [])
+
+
 def test_pictures_are_asked_for_in_parts_that_are_answered_in_time(
     store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
