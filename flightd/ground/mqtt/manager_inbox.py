@@ -7,6 +7,7 @@ however long that takes; what holds it back, or only asks, is taken then.
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Iterator
 from typing import Final
 
@@ -23,6 +24,9 @@ _LATE_S: Final = 5.0
 _MOST_WAITING: Final = 32
 _MOST_URGENT: Final = 8
 """Beside these."""
+_MOST_REFUSED: Final = 24
+"""Messages that there was no room for, of which each is told as refused: with all that wait they are as many
+as instant actions whose states are told."""
 _URGENT: Final = frozenset({"startPause", "cancelOrder"})
 _SEND_ON: Final = frozenset({"stopPause"})
 """Nobody is sent on by a manager who could not know how it was."""
@@ -31,12 +35,13 @@ _TOO_MANY: Final = f"{_MOST_WAITING} messages wait already: send it anew"
 
 
 class ManagerInbox:
-    """Bounded: the newest is refused where it is full.  `dropped` counts all that was not obeyed."""
+    """Bounded: what comes where it is full is refused, the newest of these one by one.  `dropped` counts all
+    that was not obeyed."""
 
     def __init__(self, name: str) -> None:
         self._name = name
         self._waiting: list[tuple[Said | Missed, float]] = []
-        self._beyond: Said | Missed | None = None
+        self._beyond: deque[Said | Missed] = deque(maxlen=_MOST_REFUSED)
         """The newest of those for which there was no room."""
         self.dropped = 0
 
@@ -46,12 +51,13 @@ class ManagerInbox:
         if len(self._waiting) < _MOST_WAITING + urgent * _MOST_URGENT:
             self._waiting.append((one, now_s))
             return
-        if self._beyond is None:
+        if not self._beyond:
             _LOG.warning("%s: more messages of its manager than are taken", self._name)
         self.dropped += 1
-        self._beyond = one
         if isinstance(one, Order | InstantActions):
-            self._beyond = _refused(one, ErrorType.INSUFFICIENT_MEMORY, _TOO_MANY)
+            self._beyond.append(_refused(one, ErrorType.INSUFFICIENT_MEMORY, _TOO_MANY))
+        else:
+            self._beyond.append(one)
 
     def see_late(self, now_s: float) -> None:
         """The drone is not heard: what waits for too long is not obeyed."""
@@ -63,10 +69,9 @@ class ManagerInbox:
 
     def take(self) -> list[Input]:
         """What was said since, for the drone's next step."""
-        taken: list[Input] = [one for one, _ in self._waiting]
-        if self._beyond is not None:
-            taken.append(self._beyond)
-        self._waiting, self._beyond = [], None
+        taken: list[Input] = [*(one for one, _ in self._waiting), *self._beyond]
+        self._waiting = []
+        self._beyond.clear()
         return taken
 
     def _late(self, one: Said | Missed) -> Iterator[Said | Missed]:
