@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.adapters.store.unavailable import InventoryUnavailableError
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import LocationRecord, Observation, Standing
 from flightd.core.topics import Document, Topic
@@ -88,7 +89,8 @@ class Stores:
 
     def site_name(self, name: str) -> str:
         """The name of the site that a store is of, as it says itself, else as the flight log beside it
-        has it; empty without either.  InputError where there is no store of the name."""
+        has it; empty without either.  InputError where there is no store of the name, and as `SqliteStore`
+        raises: what cannot be read now is not taken for one that does not say."""
         folder, stamp = self.folder(name), _stamp(self.folder(name))
         known = self._site_names.get(folder)
         if known is None or known[0] != stamp:
@@ -174,8 +176,8 @@ def _kept_site_name(folder: Path) -> str:
         except UnavailableError:  # its writer was cut off
             with opened_for_reading(folder, untouched=True) as store:
                 return store.site
-    except (FlightdError, OSError):
-        return ""  # whoever opens it is told why it cannot be read
+    except OSError as err:
+        raise InventoryUnavailableError(f"cannot be read: {err.strerror or err}", file=folder) from None
 
 
 def _folders(root: Path, all_of_them: bool) -> Iterator[Path]:

@@ -17,6 +17,7 @@ import msgspec
 import pytest
 
 from flightd.adapters.ground_link.client import Address
+from flightd.adapters.store import for_reading
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationState, PlaceFill, Standing, UndecidedCode
@@ -33,6 +34,7 @@ from flightd.ground.ground_store.batch import Batch, SentFlight, SentLook
 from flightd.ground.ground_store.feeder import Feeder
 from flightd.ground.ground_store.open_store import opened_store
 from flightd.ground.ground_store.questions import Question
+from flightd.ground.ground_store.sender import deliver_inventory
 from flightd.ground.ground_store.store import GroundStore
 from tests.command import Command
 from tests.rigs.event_loops import in_real_time
@@ -388,6 +390,74 @@ def test_a_store_that_is_away_is_fed_when_it_is_back(
         assert len([line for line in told if "inventory monday: not in the ground store" in line]) == 1
         feeder.feed()
         assert store.counts()["looks"] == 10
+
+
+def test_an_inventory_of_a_clock_that_is_ahead_is_not_read_again_all_the_time(
+    hall: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ahead = look("A-GATE", LocationState.EMPTY, at_s=2_000_000_000)
+    with SqliteStore(hall / "monday") as inventory:
+        inventory.commit(ahead)
+    opened: list[Path] = []
+
+    def noted(folder: Path, *more: Any) -> None:
+        opened.append(folder)
+        deliver_inventory(folder, *more)
+
+    monkeypatch.setattr(feeding, "deliver_inventory", noted)
+    now_s = 0.0
+    with opened_store(str(tmp_path / "store.db")) as store:
+        feeder = Feeder(store, hall, (), tmp_path / "state", lambda: now_s)
+        feeder.feed()
+        now_s = 599.0
+        feeder.feed()
+        assert (len(opened), store.counts()["looks"]) == (1, 10)
+        now_s = 600.0
+        feeder.feed()
+        assert len(opened) == 2
+        with SqliteStore(hall / "monday") as inventory:
+            inventory.contradict(ahead.run, ["A-GATE"])
+        feeder.feed()
+        assert (len(opened), store.counts()["looks"]) == (3, 11)
+
+
+def test_neither_a_bad_inventory_nor_damaged_decisions_keep_the_others_from_the_store(
+    hall: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    for day in ("sunday", "tuesday"):
+        shutil.copytree(hall / "monday", hall / day)
+        (hall / day / "inventory.db-wal").symlink_to(tmp_path / "elsewhere")
+    (hall / "ground.db").write_bytes(b"no database at all, but long enough " * 50)
+    with opened_store(str(tmp_path / "store.db")) as store:
+        feeder = Feeder(store, hall, (), tmp_path / "state")
+        feeder.feed()
+        feeder.feed()
+        assert store.counts()["looks"] == 10
+    told = [record.getMessage().partition(": not in the ground store: ")[0] for record in caplog.records]
+    assert sorted(told) == ["decisions about monday", "inventory sunday", "inventory tuesday"]
+
+
+def test_an_inventory_that_cannot_be_read_now_is_not_taken_for_one_of_the_log_beside_it(
+    hall: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, cut = hall / "monday" / "inventory.db", tmp_path / "cut"
+    with SqliteStore(hall / "monday") as inventory:
+        inventory.plan([], "hall 9")
+        cut.mkdir()
+        for part in ("", "-wal"):  # as a power cut leaves them
+            shutil.copy(f"{file}{part}", cut)
+    for kept in cut.iterdir():
+        shutil.copy(kept, hall / "monday")
+    now_s = 0.0
+    with opened_store(str(tmp_path / "store.db")) as store:
+        feeder = Feeder(store, hall, (), tmp_path / "state", lambda: now_s)
+        with monkeypatch.context() as busy:
+            busy.setattr(for_reading, "_TRIES", 0)
+            feeder.feed()
+        assert store.sites() == []
+        now_s = 600.0
+        feeder.feed()
+        assert store.sites() == [{"site": "hall 9"}]
 
 
 def test_a_station_says_what_of_its_folders_is_not_in_its_store(

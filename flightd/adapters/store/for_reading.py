@@ -7,6 +7,7 @@ A copy of a few megabytes can do both.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from collections.abc import Iterator
@@ -16,11 +17,13 @@ from tempfile import TemporaryDirectory
 
 from flightd.adapters.store.evidence_pictures import EvidenceFolder
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.errors import InputError, UnavailableError
+from flightd.adapters.store.unavailable import InventoryUnavailableError
+from flightd.core.errors import InputError
 
 _DATABASE = "inventory.db"
 _PARTS = (_DATABASE, f"{_DATABASE}-wal")
 _TRIES = 5
+_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 @contextmanager
@@ -29,7 +32,7 @@ def opened_for_reading(folder: Path, *, untouched: bool = False) -> Iterator[Sql
 
     `untouched`: through a copy wherever it lies, so that nothing in the folder changes, its writer's log
     neither, while a flight counts into it or after one was cut off.  Raises what `SqliteStore` raises, and
-    UnavailableError for one that changes too fast to be copied."""
+    InventoryUnavailableError for one that changes too fast to be copied, or for which there is no room."""
     if not (folder / _DATABASE).exists() or (not untouched and _is_writable(folder)):
         with SqliteStore(folder, create=False) as store:
             yield store
@@ -55,7 +58,7 @@ def _told_of(folder: Path, copy: Path) -> Iterator[None]:
     """What is wrong with the copied store is said of the original."""
     try:
         yield
-    except (InputError, UnavailableError) as err:
+    except (InputError, InventoryUnavailableError) as err:
         if str(copy) not in str(err):
             raise
         raise type(err)(str(err).replace(str(copy), str(folder))) from None
@@ -73,12 +76,20 @@ def _copied(folder: Path, copy: Path) -> None:
         except FileNotFoundError:
             continue  # a writer that ends takes its log away
         except OSError as err:
-            raise UnavailableError(
+            if err.errno in _NO_ROOM:
+                raise InventoryUnavailableError(
+                    f"no room for a copy in {copy.parent}: {err.strerror}",
+                    file=folder / _DATABASE,
+                    remedy="make room, or name another folder: TMPDIR=DIR",
+                ) from None
+            raise InventoryUnavailableError(
                 f"cannot be read: {err.strerror or err}", file=folder / _DATABASE
             ) from None
         if _state(folder) == before:
             return
-    raise UnavailableError("is being written all the time", file=folder / _DATABASE, remedy="try again")
+    raise InventoryUnavailableError(
+        "is being written all the time", file=folder / _DATABASE, remedy="try again"
+    )
 
 
 def _state(folder: Path) -> list[tuple[str, int, int]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 from pathlib import Path
 
-from flightd.core.errors import UnavailableError
+from flightd.adapters.store.unavailable import InventoryUnavailableError
 
 
 def connect_read_only(file: Path) -> sqlite3.Connection:
@@ -14,7 +14,7 @@ def connect_read_only(file: Path) -> sqlite3.Connection:
     Another user's daemon may write it: a file that were made here beside its own (`-wal`, `-shm`) could be
     one that it may not write.  So they are used as they stand while somebody writes, and where there is no
     log to be read with the file, the file is read alone.  Keep it open for one question only.
-    UnavailableError where a writer that died left a log that only a writer can take up.
+    InventoryUnavailableError where a writer that died left a log that only a writer can take up.
     """
     log, index = (file.with_name(f"{file.name}-{part}") for part in ("wal", "shm"))
     if not log.exists() or log.stat().st_size == 0:
@@ -22,7 +22,7 @@ def connect_read_only(file: Path) -> sqlite3.Connection:
     elif index.exists():
         how = "mode=ro&readonly_shm=1"
     else:
-        raise UnavailableError(
+        raise InventoryUnavailableError(
             f"{file}: its last writer was cut off",
             remedy=f"flightd inventory show {file.parent} takes that up",
         )

@@ -39,8 +39,9 @@ from flightd.adapters.store.schema import (
     WITH_SITE,
     WITH_TEXTS,
 )
+from flightd.adapters.store.unavailable import InventoryUnavailableError
 from flightd.adapters.store.undecided_codes import keep_undecided
-from flightd.core.errors import InputError, UnavailableError
+from flightd.core.errors import InputError
 from flightd.core.inventory import LocationRecord, Observation, PlannedLocation, Standing
 from flightd.core.label_values import LabelValue
 from flightd.core.scanning import CountedPlace
@@ -58,7 +59,7 @@ class SqliteStore:
 
     def __init__(self, folder: Path, *, create: bool = True, read_only: bool = False) -> None:
         """Open the store, making it when `create`.  Raises InputError for what is no inventory (or is
-        missing), UnavailableError when the disk refuses.
+        missing), InventoryUnavailableError when the disk refuses.
 
         `read_only` never makes one and leaves no trace of its own beside it, whoever writes it meanwhile."""
         self.folder = folder
@@ -78,7 +79,7 @@ class SqliteStore:
                     self._file, timeout=10.0, isolation_level=None, check_same_thread=False
                 )
         except (OSError, sqlite3.Error) as err:
-            raise UnavailableError(f"{self._file}: cannot be opened: {err}") from err
+            raise InventoryUnavailableError(f"{self._file}: cannot be opened: {err}") from err
         try:
             (self._recognise if read_only else self._prepare)()
         except BaseException:
@@ -114,7 +115,7 @@ class SqliteStore:
             yield
         except sqlite3.DatabaseError as err:
             if isinstance(err, sqlite3.OperationalError):
-                raise UnavailableError(f"{self._file}: {err}") from err
+                raise InventoryUnavailableError(f"{self._file}: {err}") from err
             raise InputError(f"{self._file}: no inventory, or a damaged one: {err}") from err
 
     def _prepare(self) -> None:
@@ -165,7 +166,7 @@ class SqliteStore:
                         self._db.execute("ROLLBACK")
                     raise
             except sqlite3.Error as err:
-                raise UnavailableError(f"{self._file}: cannot be written: {err}") from err
+                raise InventoryUnavailableError(f"{self._file}: cannot be written: {err}") from err
 
     @contextmanager
     def _reading(self) -> Iterator[None]:
@@ -173,7 +174,7 @@ class SqliteStore:
             try:
                 yield
             except sqlite3.Error as err:
-                raise UnavailableError(f"{self._file}: cannot be read: {err}") from err
+                raise InventoryUnavailableError(f"{self._file}: cannot be read: {err}") from err
             except (TypeError, ValueError) as err:  # of a row that is none of ours
                 raise InputError(f"{self._file}: no inventory, or a damaged one: {err}") from err
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import LocationRecord, LocationState, Observation
 from flightd.core.types import CodeRead
 from flightd.fleet.traffic.valued_work import PlaceFacts
@@ -70,8 +70,8 @@ class SiteFacts:
     def _is_of(self, inventory: str, site: str) -> bool:
         try:
             return self._inventories.site_name(inventory) == site
-        except InputError:
-            return False  # it was put away since
+        except (InputError, UnavailableError):
+            return False  # it was put away since, or cannot be read now
 
     def _facts(self, row: Mapping[str, Any], contradicted: bool, asked: bool) -> PlaceFacts:
         ns = row["utc_ns"] if LocationState(row["state"]).is_counted else None

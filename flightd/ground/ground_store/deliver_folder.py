@@ -9,9 +9,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from flightd.core.errors import InputError, UnavailableError
+from flightd.adapters.store.unavailable import InventoryUnavailableError
+from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.ground.decision_book import FILE as DECISIONS
-from flightd.ground.decision_book import DecisionBook
+from flightd.ground.decision_book import Decision, DecisionBook
 from flightd.ground.flights.log_folder import CUT, find_logs
 from flightd.ground.ground_store.sender import (
     Delivered,
@@ -21,6 +22,8 @@ from flightd.ground.ground_store.sender import (
     deliver_inventory,
 )
 from flightd.ground.stores import Stores
+
+_NO_STORES_FAULT = InputError, InventoryUnavailableError
 
 
 def deliver_paths(paths: Sequence[Path], site: str, source: str, target: Target, done: Delivered) -> None:
@@ -44,31 +47,34 @@ def _deliver_path(path: Path, site: str, source: str, target: Target, done: Deli
     logs = [log for log in found.logs if only in {None, log.relative}]
     if not inventories and not logs:
         raise InputError("holds neither an inventory.db nor a flight log", file=path)
-    sites = {name: site or stores.site_name(name) for name in inventories}
+    sites: dict[str, str] = {}
     for name in inventories:
-        with _going_on(stores.folder(name), done):
-            deliver_inventory(stores.folder(name), sites[name], source, target, done)
+        with _going_on(path, done):
+            folder = stores.folder(name)
+            sites[name] = site or stores.site_name(name)
+            deliver_inventory(folder, sites[name], source, target, done)
     with _going_on(path, done):
         deliver_flights(logs, site, source, target, done)
     if found.cut and only is None:
         done.failures.append(f"{path}: {CUT}; deliver the folders in it one by one")
     if only is None and (root / DECISIONS).is_file():
-        book = DecisionBook(root)
-        for name in inventories:
-            if sites[name]:
-                deliver_decisions(book.decisions(name), sites[name], source, target, done)
+        decided: dict[str, list[Decision]] = {}
+        with _going_on(path, done, (InputError, UnavailableError)):  # no store is asked
+            book = DecisionBook(root)
+            decided = {name: book.decisions(name) for name, of_site in sites.items() if of_site}
+        for name, decisions in decided.items():
+            with _going_on(path, done):
+                deliver_decisions(decisions, sites[name], source, target, done)
 
 
 @contextmanager
-def _going_on(path: Path, done: Delivered) -> Iterator[None]:
+def _going_on(
+    path: Path, done: Delivered, ours: tuple[type[FlightdError], ...] = _NO_STORES_FAULT
+) -> Iterator[None]:
     """What goes wrong with one is told, and the next one's turn comes."""
     try:
         yield
     except OSError as err:
         done.failures.append(f"{err.filename or path}: {err.strerror or err}")
-    except InputError as err:
-        done.failures.append(str(err))
-    except UnavailableError as err:
-        if not str(err).startswith(str(path)):
-            raise
+    except ours as err:
         done.failures.append(str(err))

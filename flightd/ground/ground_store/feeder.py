@@ -22,7 +22,8 @@ import msgspec
 from flightd.core.errors import FlightdError, InputError
 from flightd.ground.access.audit import audit_files
 from flightd.ground.access.people_book import PeopleBook
-from flightd.ground.decision_book import Decision, DecisionBook
+from flightd.ground.decision_book import FILE as DECISIONS
+from flightd.ground.decision_book import DecisionBook
 from flightd.ground.flights.log_folder import CUT, find_logs
 from flightd.ground.ground_store.batch import MOST_LOOKS, Batch, SentLine, SentPerson
 from flightd.ground.ground_store.sender import (
@@ -38,6 +39,9 @@ from flightd.ground.stores import Stores
 
 _LOG = logging.getLogger(__name__)
 _EACH_S = 10.0
+_PUT_OFF_S = 600.0
+"""Until what is wrong in itself is tried again, unchanged: a clock may have been set, and an inventory is
+copied for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +59,12 @@ class Feeder:
     audit.  What cannot be delivered is said once, and tried again and again."""
 
     def __init__(
-        self, store: GroundStore, folder: Path | None, others: Sequence[ReadFolder], state: Path
+        self,
+        store: GroundStore,
+        folder: Path | None,
+        others: Sequence[ReadFolder],
+        state: Path,
+        now_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._store = store
         self._folder = folder
@@ -64,6 +73,9 @@ class Feeder:
         self._state = state
         self._source = platform.node()
         self._done: dict[str, object] = {}
+        self._now_s = now_s
+        self._put_off: dict[str, tuple[object, float]] = {}
+        """The stamp of what is wrong, and until when it is left alone."""
         self._failures: dict[str, str] = {}
         self._read: dict[bytes, int] = {}
         """How much was delivered of each file of the audit since the station began, by the SHA-256 of its
@@ -86,10 +98,23 @@ class Feeder:
             for kind in (self._inventories, self._flights, self._people, self._audit):
                 with self._failure_told(kind.__name__.strip("_")):
                     for part in kind():
-                        if not self._ending and self._done.get(part.name) != part.stamp:
+                        if self._is_due(part):
                             with self._failure_told(part.name):
-                                if part.deliver():
-                                    self._done[part.name] = part.stamp
+                                self._deliver(part)
+
+    def _is_due(self, part: _Part) -> bool:
+        if self._ending or self._done.get(part.name) == part.stamp:
+            return False
+        stamp, until_s = self._put_off.get(part.name, (None, 0.0))
+        return stamp != part.stamp or self._now_s() >= until_s
+
+    def _deliver(self, part: _Part) -> None:
+        try:
+            if part.deliver():
+                self._done[part.name] = part.stamp
+        except InputError:
+            self._put_off[part.name] = part.stamp, self._now_s() + _PUT_OFF_S
+            raise
 
     @contextmanager
     def _failure_told(self, what: str) -> Iterator[None]:
@@ -105,18 +130,37 @@ class Feeder:
             self._failures.pop(what, None)
 
     def _inventories(self) -> Iterator[_Part]:
-        book = None if self._folder is None else DecisionBook(self._folder)
+        decided = None if self._folder is None else _changed(self._folder / DECISIONS)
         for name, written_ns in reversed(self._stores.names()):  # what follows on is soonest taken
-            site = self._stores.site_name(name)
-            decisions = [] if book is None else book.decisions(name)
-            deliver = partial(self._deliver_inventory, name, site, decisions)
-            yield _Part(f"inventory {name}", (written_ns, len(decisions), site), deliver)
+            site, trouble = self._site(name)
+            deliver = partial(self._deliver_inventory, name, site, trouble)
+            yield _Part(f"inventory {name}", (written_ns, site, trouble), deliver)
+            if site and decided is not None:
+                deliver = partial(self._deliver_decisions, name, site)
+                yield _Part(f"decisions about {name}", (decided, site), deliver)
 
-    def _deliver_inventory(self, name: str, site: str, decisions: Sequence[Decision]) -> bool:
+    def _deliver_inventory(self, name: str, site: str, trouble: str) -> bool:
+        if trouble:
+            raise InputError(trouble)
         done = Delivered()
         deliver_inventory(self._stores.folder(name), site, self._source, self._store, done)
-        deliver_decisions(decisions, site, self._source, self._store, done)
+        if done.failures:
+            more = f" (and {len(done.failures) - 1} more)" if len(done.failures) > 1 else ""
+            raise InputError(f"{done.failures[0]}{more}")
         done.check_clocks()
+        return True
+
+    def _site(self, name: str) -> tuple[str, str]:
+        """Of which site an inventory is, and why that cannot be told."""
+        try:
+            return self._stores.site_name(name), ""
+        except (FlightdError, OSError) as err:
+            return "", str(err)
+
+    def _deliver_decisions(self, name: str, site: str) -> bool:
+        if self._folder is not None:
+            decisions = DecisionBook(self._folder).decisions(name)
+            deliver_decisions(decisions, site, self._source, self._store, Delivered())
         return True
 
     def _flights(self) -> Iterator[_Part]:
@@ -158,6 +202,15 @@ class Feeder:
                 self._store.take(Batch("", self._source, audit=tuple(sent)))
                 self._read[first] = self._read.get(first, 0) + sum(map(len, whole))
         return True
+
+
+def _changed(file: Path) -> tuple[int, int] | None:
+    """What is another whenever the file is; None where there is none."""
+    try:
+        stamp = file.stat()
+    except OSError:
+        return None
+    return stamp.st_size, stamp.st_mtime_ns
 
 
 def _sent_line(line: str) -> SentLine:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import json
 import random
+import sqlite3
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -272,6 +273,47 @@ def test_one_inventory_that_cannot_be_delivered_keeps_no_other_back(flightd: Com
     ]
     with GroundStore(_engine_at(str(tmp_path / "counts.db")), FolderEvidence(tmp_path / "e")) as store:
         assert {"monday", "thursday"} <= {row["location"] for row in store.stock(SITE)}
+
+
+def test_an_inventory_that_may_not_be_looked_at_keeps_no_other_back(
+    store: GroundStore, tmp_path: Path
+) -> None:
+    folder = tmp_path / "drone"
+    for day in ("monday", "tuesday", "wednesday"):
+        counted_store(folder / day)
+        with SqliteStore(folder / day) as inventory:
+            inventory.plan([PlannedLocation(day, "A1")], SITE)
+        DecisionBook(folder).add(day, Decision(f"of {day}", day, 5, 4, Decided.FINE, "ann"))
+    (folder / "tuesday" / "inventory.db-wal").symlink_to(tmp_path / "elsewhere")
+    done = Delivered()
+    deliver_paths([folder], "", "drone", store, done)
+    assert done.failures == ["the inventory 'tuesday' has a inventory.db-wal that is no plain file"]
+    assert {"monday", "wednesday"} <= {row["location"] for row in store.stock(SITE)}
+    assert done.decisions == 2
+
+
+def test_a_file_of_decisions_that_cannot_be_read_is_told_and_the_rest_delivered(
+    store: GroundStore, tmp_path: Path
+) -> None:
+    folder = tmp_path / "drone"
+    counted_store(folder)
+    book = DecisionBook(folder)
+    book.add(".", Decision("decision-1", "A-GATE", 5, 4, Decided.FINE, "ann"))
+    done = Delivered()
+    with closing(sqlite3.connect(folder / "ground.db")) as other:
+        other.execute("ALTER TABLE decision RENAME TO elsewhere")
+    deliver_paths([folder, folder / "inventory.db"], SITE, "drone", store, done)
+    assert [line.partition("ground.db")[0] for line in done.failures] == [f"{folder}/"]
+    assert (done.looks, done.already) == (10, 10)
+
+
+def test_a_store_that_cannot_be_had_ends_the_delivery_though_it_lies_in_the_folder(tmp_path: Path) -> None:
+    """Its error begins with the path of the folder, as an inventory's does."""
+    counted_store(tmp_path)
+    with GroundStore(_engine_at(str(tmp_path / "counts.db")), FolderEvidence(tmp_path / "e")) as store:
+        (tmp_path / "e").write_bytes(b"no folder")
+        with pytest.raises(UnavailableError, match="cannot keep the picture"):
+            deliver_paths([tmp_path], SITE, "drone", store, Delivered())
 
 
 def test_however_many_folders_there_are_each_inventory_is_delivered(

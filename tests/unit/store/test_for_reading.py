@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 
 import pytest
 from typer.testing import CliRunner, Result
 
 from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.adapters.store.unavailable import InventoryUnavailableError
 from flightd.cli.main import app
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState, Observation, PlannedLocation
@@ -112,3 +114,16 @@ def test_what_is_wrong_is_said_of_the_store_and_not_of_a_copy(store: Path) -> No
         shown = run("show", store)
     assert isinstance(shown.exception, InputError)
     assert f"{store / 'inventory.db'}: no inventory, or a damaged one" in str(shown.exception)
+
+
+def test_that_there_is_no_room_for_the_copy_is_told_as_that(store: Path) -> None:
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(InventoryUnavailableError) as caught, opened_for_reading(store, untouched=True):
+            pytest.fail("there is room")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    told = str(caught.value)
+    assert told.startswith(f"{store}/inventory.db: no room for a copy in {gettempdir()}: ")
+    assert told.endswith("; make room, or name another folder: TMPDIR=DIR")
