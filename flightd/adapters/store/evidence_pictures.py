@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import threading
 from pathlib import Path
 
 from flightd.core.errors import UnavailableError
@@ -23,7 +25,7 @@ def evidence_file(name: str) -> str:
 
 
 class EvidenceFolder:
-    """Pictures by content: FOLDER/ab/abcd….jpg.  The same picture twice is one file."""
+    """Pictures by content: FOLDER/ab/abcd….jpg.  The same picture twice is one file, at one time, too."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -40,12 +42,14 @@ class EvidenceFolder:
         target = self.path(name)
         if target.exists():
             return name
+        part = target.with_name(f"{name}.{os.getpid()}.{threading.get_ident()}.part")
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            part = target.with_name(f"{name}.{os.getpid()}.part")
             replace_file(target, part, jpeg)
             sync_folder(self._folder)
         except OSError as err:
+            with contextlib.suppress(OSError):
+                part.unlink()  # each try on a full disk would leave one
             raise UnavailableError(f"{target}: cannot keep the picture: {err.strerror or err}") from err
         return name
 

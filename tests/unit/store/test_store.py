@@ -9,6 +9,8 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +19,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightd.adapters.store import evidence_pictures
+from flightd.adapters.store.evidence_pictures import EvidenceFolder
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
@@ -30,6 +34,7 @@ from flightd.core.inventory import (
 )
 from flightd.core.types import CodeRead
 from flightd.ports import Store
+from flightd.runtime.durable_files import replace_file
 from flightd.vision.shelf.evidence_jpeg import MOST_BYTES, evidence_jpeg
 from tests.rigs.patience import COMMAND_S
 from tests.unit.store.kill_at_random import look
@@ -207,6 +212,35 @@ def test_evidence_pictures_fit_their_size_and_are_kept_once(tmp_path: Path) -> N
         assert len(list((tmp_path / "evidence").rglob("*.*"))) == 1
         with pytest.raises(ValueError, match="50000"):
             store.keep_evidence(b"x" * 60_000)
+
+
+def test_a_picture_that_two_keep_at_once_is_kept_by_both(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together = threading.Barrier(2, timeout=30.0)
+
+    def both_write(path: Path, beside: Path, data: bytes) -> None:
+        beside.write_bytes(b"half")
+        together.wait()
+        replace_file(path, beside, data)
+
+    monkeypatch.setattr(evidence_pictures, "replace_file", both_write)
+    folder = EvidenceFolder(tmp_path)
+    with ThreadPoolExecutor(2) as threads:
+        first, second = threads.map(folder.keep, [b"a picture"] * 2)
+    assert first == second
+    assert [path.read_bytes() for path in tmp_path.rglob("*.*")] == [b"a picture"]
+
+
+def test_a_picture_for_which_there_is_no_room_leaves_nothing_behind(tmp_path: Path) -> None:
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(UnavailableError, match="cannot keep the picture"):
+            EvidenceFolder(tmp_path).keep(b"x" * 2000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert list(tmp_path.rglob("*.*")) == []
 
 
 def test_half_written_pictures_are_swept_at_the_start(tmp_path: Path) -> None:
