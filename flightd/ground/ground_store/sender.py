@@ -106,6 +106,7 @@ def deliver_inventory(folder: Path, site: str, source: str, target: Target, done
             file=folder,
             remedy="deliver it with --site NAME, or FLIGHTD_SITE",
         )
+    target.standings(())  # nothing is copied, every ten minutes, for one that is away
     with opened_for_reading(folder, untouched=True) as inventory:
         planned_ns = inventory.newest_ns()
         for places in _parts(inventory.planned()):

@@ -8,6 +8,7 @@ import random
 import sqlite3
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -36,6 +37,7 @@ from flightd.ground.ground_store.evidence import Evidence, FolderEvidence
 from flightd.ground.ground_store.postgres_engine import PostgresSession
 from flightd.ground.ground_store.prune import prune
 from flightd.ground.ground_store.sender import Delivered, deliver_inventory
+from flightd.ground.ground_store.station_target import StationTarget
 from flightd.ground.ground_store.store import GroundStore
 from tests.command import Command
 from tests.web.stock_rig import RACKS, counted_store, flown_log, picture_of
@@ -476,6 +478,20 @@ def test_only_what_the_store_has_is_pruned(store: GroundStore, tmp_path: Path) -
         assert lost in [look for look, _ in inventory.looks()]
         assert prune(inventory.folder, store).looks == 0
     assert store.counts()["looks"] == 25
+
+
+def test_no_inventory_is_copied_for_a_store_that_is_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted_store(tmp_path / "monday")
+    copies = tmp_path / "copies"
+    copies.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(copies))
+    made_ns = copies.stat().st_mtime_ns
+    done = Delivered()
+    with pytest.raises(UnavailableError, match="the station cannot be had"):
+        deliver_inventory(tmp_path / "monday", SITE, "north", StationTarget("http://127.0.0.1:1", "k"), done)
+    assert copies.stat().st_mtime_ns == made_ns
 
 
 def test_one_picture_that_is_damaged_or_cannot_be_read_keeps_no_other_look_back(
