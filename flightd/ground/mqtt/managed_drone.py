@@ -64,6 +64,7 @@ _ASK_AGAIN_S: Final = 2.0
 _MOST_WORDS: Final = 300
 _MOST_PLANS: Final = 16
 _COMMANDS: Final = frozenset(CommandKind)
+_DID_NOTHING: Final[tuple[Next, float, int]] = (None, 0.0, 0)
 _OURS: Final = "vda5050-"
 """Before the id of what a manager's vehicle side asks of a drone."""
 
@@ -133,7 +134,7 @@ class ManagedDrone:
         self._asked_at_s = -_ASK_AGAIN_S
         self._return, self._charge = SafeReturn(), ChargeTrend()
         self._acting: asyncio.Task[None] | None = None
-        self._did: tuple[Next, float, int] = (None, 0.0, 0)
+        self._did = _DID_NOTHING
         """The last act, when it was answered, and the status by which it shows."""
         self._order: Order | None = None
         self._ahead: list[str] = []
@@ -218,13 +219,17 @@ class ManagedDrone:
 
     def taken_by_person(self, taken: bool = True) -> None:
         """A person commands the drone from now on, or gives it back."""
-        if taken and self._acting is not None:
-            self._acting.cancel()  # nothing of the manager's is sent after it
         if taken:
+            self._leave_off()
             self._counts.given = ()
         if taken is not self._taken:
             self._taken = taken
             self.on_taken(taken)
+
+    def _leave_off(self) -> None:
+        """Nothing of the manager's is sent after it."""
+        if self._acting is not None:
+            self._acting.cancel()
 
     def _take_welcome(self, welcome: dict[str, Any]) -> None:
         before, self._welcome = self._welcome, welcome
@@ -237,7 +242,10 @@ class ManagedDrone:
         self.flies = self.lands = self.docks = self.has_more = False
         self._asked_at_s = -_ASK_AGAIN_S
         self._return, self._charge = SafeReturn(), ChargeTrend()
-        self._counts.given = ()
+        self._leave_off()
+        # it counts its statuses, and maybe its clock, from the beginning
+        self._did, self._planned, self._trouble = _DID_NOTHING, None, None
+        self._counts, self._progress = ShelfCounts(), []
         self._sent.clear()
         if kept := self._before.greet(str(welcome["session"])):
             self._plans.extend(kept.plans)

@@ -100,14 +100,19 @@ class Managed:
         running = asyncio.create_task(self.drone.run(self.link))  # type: ignore[arg-type]
         try:
             self.heard()
-            self.drone.tell("welcome", {"session": "s", "role": "operator", "floor": floor_status(SITE)})
-            self.drone.tell("events", ())
-            self.tell(Phase.PREFLIGHT)
-            await asyncio.sleep(3.0)
+            await self.begins("s")
             yield
         finally:
             running.cancel()
             await asyncio.wait([running])
+
+    async def begins(self, session: str) -> None:
+        """Its daemon does, and is asked where it stands; what it tells is counted from the beginning."""
+        self._seq = 0
+        self.drone.tell("welcome", {"session": session, "role": "operator", "floor": floor_status(SITE)})
+        self.drone.tell("events", ())
+        self.tell(Phase.PREFLIGHT)
+        await asyncio.sleep(3.0)
 
     def heard(self, heard: bool = True) -> None:
         self.drone.tell("link", LinkState(heard, 0.0 if heard else 10.0, 1.0, 0, False, False, ""))

@@ -275,3 +275,40 @@ def test_a_drone_that_is_lost_takes_no_new_order() -> None:
             assert sorted(demo.errors) == ["LOCALIZATION_ERROR", "START_NODE_OUT_OF_RANGE"]
 
     virtual(go())
+
+
+def test_a_daemon_that_was_started_anew_is_asked_whatever_the_one_before_had_told() -> None:
+    demo = Managed()
+
+    async def go() -> None:
+        async with demo.flown():
+            demo.drone.hear(order("A1 A2"))
+            await asyncio.sleep(5.0)
+            demo.tell(Phase.PREFLIGHT)
+            await asyncio.sleep(5.0)
+            assert demo.link.asked[-1] == "start"
+            await demo.begins("anew")
+            demo.drone.hear(order("A1 A2 A3", name="next"))
+            await asyncio.sleep(5.0)
+            assert demo.link.asked[-1] == "plan A2 A3, to wait there"
+
+    virtual(go())
+
+
+def test_what_was_visited_before_the_daemon_was_started_anew_ends_no_count() -> None:
+    demo = Managed()
+
+    async def go() -> None:
+        async with demo.flown():
+            for _ in range(9):
+                demo.tell(Phase.PREFLIGHT)
+            demo.happens("visited", "A2")
+            await asyncio.sleep(1.0)
+            await demo.begins("by a clock of its own")
+            demo.drone.hear(order("A1 A2", actions={"A2": [scan("count", side="left")]}))
+            await asyncio.sleep(5.0)
+            demo.tell(Phase.SCAN, "A2 A2 A1", waits_at="A2")
+            await asyncio.sleep(5.0)
+            assert demo.actions["count"] == "RUNNING"
+
+    virtual(go())
