@@ -101,6 +101,8 @@ class PaperDrone:
         """Its daemon begins anew, believing to be on its pad."""
         self._session += 1
         self.phase, self.way, self.paused, self.left_s = Phase.PREFLIGHT, [], False, 900.0
+        self.plan, self._plan_waits = "", False
+        self._events, self._events_seq, self._seq = [], itertools.count(1), itertools.count(1)
         self.waits = False
         self.stand = self.site.home.node
         """The node on whose pad it believes to stand before a flight."""

@@ -171,6 +171,7 @@ class Dispatcher:
         freed = self._near(drone)
         self.control.enter(drone, place, ends=(pad,))
         self._heard_ms[drone] = now_ms
+        self._charge.pop(drone, None)  # nothing is decided by what it told before
         if not self.docks.flies_on(drone, pad) and place != pad:
             self._comes_back.add(drone)
         self._free(freed)

@@ -53,10 +53,28 @@ def test_who_is_low_after_its_tour_charges_on_the_shared_pad_and_flies_again_fro
     fly(go, "ab", docks=DOCKS)
 
 
+def test_who_comes_down_there_is_charged_whatever_waits_for_it() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a = fleet.drones["a"]
+        a.battery_frac = 0.5
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: holder(fleet) == ("a", False), 100)
+        fleet.own.ask(["A4"], "a")
+        await on_dock(fleet, "a")
+        await asyncio.sleep(30.0)
+        assert (a.phase, fleet.state["open"]) == (Phase.PREFLIGHT, ["A4"])
+        a.battery_frac = 0.85
+        await until(lambda: "A4" in fleet.state["done"], 100)
+
+    fly(go, "ab", docks=DOCKS)
+
+
 def test_two_that_are_low_never_come_to_one_pad() -> None:
     async def go(fleet: PaperFleet) -> None:
         a, b = fleet.drones["a"], fleet.drones["b"]
         a.battery_frac = b.battery_frac = 0.5
+        fleet.own.hand_over("c", to_manager=False)
+        fleet.own.ask(["B4"], "c")  # that waits all the time
         fleet.own.ask(["A3"], "a")
         fleet.own.ask(["B3"], "b")
         await until(lambda: holder(fleet)[1], 300)
@@ -66,14 +84,16 @@ def test_two_that_are_low_never_come_to_one_pad() -> None:
         assert not any(
             what.endswith("onto its pad") for what, name, *_ in fleet.written if name == other.name
         )
+        await asyncio.sleep(1.0)
         other.begin_anew()  # on its own pad, and still low
         await until(lambda: fleet.flown(other.name), 30)
+        await asyncio.sleep(30.0)
+        assert (other.phase, holder(fleet)) == (Phase.PREFLIGHT, (first, True))
         fleet.drones[first].charges_per_s = 0.02
-        fleet.own.ask(["A4"], other.name)
         await until(lambda: fleet.drones[first].phase is Phase.DONE, 300)  # it made room
         await until(lambda: holder(fleet) == (other.name, True), 200)
 
-    fly(go, "ab", docks=DOCKS)
+    fly(go, "abc", docks=DOCKS)
 
 
 def test_who_is_charged_and_may_not_be_sent_anywhere_keeps_the_pad_until_he_may() -> None:
