@@ -363,7 +363,7 @@ class Dispatcher:
                 drone in self._charge
                 and not course.failed
                 and course.doubt_m <= 0.0
-                and drone not in self._held
+                and (drone not in self._held or self.control.is_cut_off(drone))
                 and (works or drone in holders or vertices[course.place].pad is None)
             ):
                 known[drone] = Standing(self._level[drone], self._charging[drone])

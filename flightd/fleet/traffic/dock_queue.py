@@ -15,6 +15,7 @@ from typing import Final
 from flightd.fleet.traffic.distances import Distances
 from flightd.fleet.traffic.docks import Dock, DockKind, Waiting, chosen_docks
 from flightd.fleet.traffic.drone_course import DroneCourse
+from flightd.fleet.traffic.motions import NEVER
 from flightd.fleet.traffic.open_ways import OpenWays
 from flightd.fleet.traffic.plan import Stop
 from flightd.fleet.traffic.traffic_control import TrafficControl
@@ -121,8 +122,9 @@ class DockQueue:
         """What has to be left of a battery on the drone's own pad: the way to a dock."""
         if not self._docks:
             return 0
-        ways = ((self._way_ms(self.home(drone), dock), self._back_ms(drone, dock)) for dock in self.docks)
-        return min(map(sum, ways))
+        home = self.home(drone)
+        ways = (self._distances.to(dock.place)[home] + self._back_ms(drone, dock) for dock in self.docks)
+        return min(ways) + self._stops_ms
 
     def step(self, now_ms: int, known: dict[str, Standing], left_ms: dict[str, int]) -> None:
         """Free docks, land anew, let those go that are done, and send who waits.  `known` are the drones that
@@ -146,7 +148,11 @@ class DockQueue:
         back_ms = self._open_ways.ms(drone, dock.place, home) if self._returns else 0
         there_ms = self._open_ways.ms(drone, course.base_end, (dock.place,)) + back_ms
         home_ms = self._open_ways.ms(drone, course.base_end, home)
-        if home_ms < there_ms and base_ms + there_ms > left_ms and not self._is_early(drone, now_ms):
+        if (
+            home_ms < min(there_ms, NEVER)
+            and base_ms + there_ms > left_ms
+            and not self._is_early(drone, now_ms)
+        ):
             self._next_try_ms[drone] = now_ms + _RETRY_MS
             self._tell(f"{drone} turns back on its way to dock {dock.name}: its battery would not last")
             self._go_home(drone, now_ms)
@@ -213,10 +219,11 @@ class DockQueue:
                 continue
             self._since_ms.setdefault(drone, now_ms)
             ways = {
-                dock.name: self._way_ms(course.base_end, dock)
+                dock.name: self._open_ways.ms(drone, course.base_end, (dock.place,)) + self._stops_ms
                 for dock in self._docks.values()
                 if dock.place not in shut
             }
+            ways = {name: way_ms for name, way_ms in ways.items() if way_ms < NEVER}
             near = {
                 name: way_ms
                 for name, way_ms in ways.items()
@@ -235,7 +242,7 @@ class DockQueue:
     def _send(
         self, waiting: Sequence[Waiting], known: dict[str, Standing], left_ms: dict[str, int], now_ms: int
     ) -> None:
-        free_ms = {name: self._free_in_ms(name, known) for name in self._docks}
+        free_ms = {name: self._free_in_ms(name, known, left_ms) for name in self._docks}
         for drone, dock in chosen_docks(self._docks.values(), free_ms, waiting).items():
             holder = self._holder.get(dock.name)
             if holder is not None:
@@ -265,13 +272,15 @@ class DockQueue:
             self._next_try_ms[holder] = now_ms + _RETRY_MS
             self._go_home(holder, now_ms)
 
-    def _free_in_ms(self, name: str, known: dict[str, Standing]) -> int:
+    def _free_in_ms(self, name: str, known: dict[str, Standing], left_ms: Mapping[str, int]) -> int:
         holder = self._holder.get(name)
         if holder is None:
             return 0
         dock, course = self._docks[name], self._control.drones[holder]
         standing = known.get(holder)
         charge = 0.0 if standing is None else standing.charge
+        if charge >= self._full_enough and left_ms[holder] <= 0:
+            charge = 0.0  # who may not be sent anywhere stays for nobody knows how long
         return self._distances.to(dock.place)[course.place] + dock.service_ms(charge) + _LEAVES_MS
 
     def _is_early(self, drone: str, now_ms: int) -> bool:
@@ -292,9 +301,10 @@ class DockQueue:
         """From a dock to the drone's own pad, where it has to come there."""
         return self._distances.to(self.home(drone))[dock.place] if self._returns else 0
 
-    def _way_ms(self, place: int, dock: Dock) -> int:
-        net = self._control.net
-        return self._distances.to(dock.place)[place] + 4 * (net.launch_ms + net.stop_ms)
+    @property
+    def _stops_ms(self) -> int:
+        """On the way to a dock."""
+        return 4 * (self._control.net.launch_ms + self._control.net.stop_ms)
 
 
 def docks_of(

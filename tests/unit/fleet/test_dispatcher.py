@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from flightd.fleet.traffic.closures import Closure
 from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
@@ -28,8 +29,10 @@ def charge_for(left_s: float) -> float:
 class Steps:
     """A dispatcher a second at a time, by drones that do an action in each, or `wait`."""
 
-    def __init__(self, dispatcher: Dispatcher) -> None:
+    def __init__(self, dispatcher: Dispatcher, **levels: float) -> None:
         self.dispatcher = dispatcher
+        self.levels = levels
+        """Of their batteries, where their charges tell something else."""
         self.now_ms = 0
 
     def go(self, charges: Mapping[str, float], *, wait: bool = False) -> None:
@@ -37,7 +40,7 @@ class Steps:
         for drone, charge in charges.items():
             course = self.dispatcher.control.drones[drone]
             done = course.done + (bool(course.base) and not wait)
-            reports.append(DroneReport(drone, done, charge))
+            reports.append(DroneReport(drone, done, charge, level=self.levels.get(drone)))
         self.now_ms += 1000
         self.dispatcher.step(self.now_ms, reports)
 
@@ -78,6 +81,21 @@ def test_who_waits_too_long_on_its_way_to_a_dock_goes_home_instead() -> None:
     assert "d0 turns back on its way to dock D: its battery would not last" in steps.dispatcher.docks.told
     steps.all(60, {"d0": charge_for(60.0)})
     assert control.drones["d0"].place == home
+
+
+def test_a_dock_that_who_is_charged_may_not_leave_is_not_waited_for_while_another_one_is_free() -> None:
+    hall = SmallHall(3, 6, 4)
+    pads = {hall.lanes.vertices[pad].node: pad for pad in hall.lanes.pads}
+    control = TrafficControl(hall.lanes, replace(PACE, speed_mps=0.2), CELL)
+    control.enter("d0", pads["DAA10"], ends=(pads["DAA1"],))
+    control.enter("d1", pads["DAB10"])
+    docks = [Dock(node, pads[node], DockKind.CONTACT, 1800.0) for node in ("DAA10", "DAB1")]
+    queue = work("A6")
+    steps = Steps(Dispatcher(control, queue, Endurance(FULL_S), docks=docks, keep_home=True), d0=1.0)
+    while not queue.done:
+        steps.go({"d0": 0.0, "d1": 1.0})
+    steps.all(20, {"d0": 0.0, "d1": 0.85}, wait=True)
+    assert steps.dispatcher.docks.holders == {"DAA10": "d0", "DAB1": "d1"}
 
 
 def test_what_no_battery_lasts_for_is_told_once_all_were_ready_and_tried_with_a_fuller_one() -> None:

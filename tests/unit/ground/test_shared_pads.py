@@ -152,6 +152,35 @@ def test_who_is_taken_on_its_way_down_and_given_back_there_still_has_the_pad() -
     fly(go, "ab", docks=DOCKS)
 
 
+def test_who_is_low_takes_the_shared_pad_to_which_a_way_is_open() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a = fleet.drones["a"]
+        await fleet.own.close("ann", nodes=("A4", "A5"))
+        a.battery_frac = 0.5
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: a.phase is Phase.PREFLIGHT and a.stand == "B5", 200)
+        assert [dock["drone"] for dock in docks(fleet)] == ["", "a"]
+
+    fly(go, "ab", docks=("A5", "B5"))
+
+
+def test_who_is_cut_off_from_its_own_pad_waits_on_a_shared_one() -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a = fleet.drones["a"]
+        fleet.own.ask(["A3"], "a")
+        await until(lambda: a.phase is Phase.HOVER and a.way[0] == "A3", 100)
+        a.battery_frac = 0.5
+        await fleet.own.close("ann", nodes=("A1", "A2"))
+        await on_dock(fleet, "a")
+        a.battery_frac = 0.9
+        await fleet.own.open("A1, A2")
+        fleet.own.ask(["A4"], "a")
+        await until(lambda: "A4" in fleet.state["done"] and a.phase is Phase.DONE, 200)
+        assert a.stand == "A5", "it came home from there"
+
+    fly(go, "ab", docks=DOCKS)
+
+
 def test_a_daemon_that_takes_no_other_pad_comes_home() -> None:
     async def go(fleet: PaperFleet) -> None:
         a = fleet.drones["a"]
