@@ -14,6 +14,7 @@ _VALUE_SPAN_MS: Final = 3_600_000
 """A class of value outweighs the way to it up to so long."""
 _MOST_OF_TOUR: Final = 40
 """A drone is not given more nodes at a time."""
+HOURS_UNKNOWN: Final = "it is not known yet whether its schedule lets it begin"
 
 
 class Value(IntEnum):
@@ -111,13 +112,12 @@ class WorkQueue:
     @property
     def ready(self) -> tuple[str, ...]:
         """Those that may be begun now."""
-        return tuple(node for node in self.open if self._may_begin(self._work[node]))
+        return tuple(node for node in self.open if not self._held_for(self._work[node]))
 
     @property
     def held(self) -> dict[str, str]:
         """The nodes that wait for the hours of their schedule, and why."""
-        whys = ((node, self.runs.get(self._work[node].run, "")) for node in self.open)
-        return {node: why for node, why in whys if why}
+        return {node: why for node in self.open if (why := self._held_for(self._work[node]))}
 
     @property
     def runs_left(self) -> frozenset[str]:
@@ -125,8 +125,9 @@ class WorkQueue:
         runs = {self._work[node].run for node in (*self._open, *self._given)}
         return frozenset(runs - {""})
 
-    def _may_begin(self, work: NodeWork) -> bool:
-        return not work.run or not self.runs.get(work.run, "nothing is known of it")
+    def _held_for(self, work: NodeWork) -> str:
+        """Why it is not begun now; empty where it may be."""
+        return self.runs.get(work.run, HOURS_UNKNOWN) if work.run else ""
 
     def levels_of(self, node: str) -> tuple[int, ...]:
         """Which are counted there; none: all."""
@@ -234,7 +235,7 @@ class WorkQueue:
         aisles: dict[str, list[NodeWork]] = {}
         for node in self._open:
             work = self._work[node]
-            if node in without or not self._may_begin(work):
+            if node in without or self._held_for(work):
                 continue
             named = bool(drone) and work.drone == drone
             if named or (not work.drone and work.aisle not in busy_aisles):

@@ -77,8 +77,11 @@ class OwnFleet(VehicleSides):
         self._queue = WorkQueue(())
         self._runs: dict[str, float] = {}
         """Of schedules, whose work it was given, and until when (UTC) each may be begun."""
-        self._starts_by_hours: list[FleetDrone] = []
-        """Those that may leave the ground once it is known again what a run may have begun."""
+        self._may_leave = True
+        """Drones may leave the ground for what waits: somebody asked, or the site starts without a person."""
+        self._untold_runs: frozenset[str] = frozenset()
+        """Of the station before, by hours that may have changed since: nobody leaves the ground until they
+        are told again, or a person asks."""
         self._over: Mapping[str, str] = {}
         """Those of which nothing more is begun, and why."""
         self._kept_runs: frozenset[str] = frozenset()
@@ -204,15 +207,12 @@ class OwnFleet(VehicleSides):
         drones = self._drones_on(made)
         for name, drone in drones.items():
             drone.recall(fleet.drones[name])
-            drone.may_start = floor.floors[name].unattended_start
         self._compared, self._queue = dict(floor.floors), WorkQueue.of(fleet.work)
         self._runs = {run: given.until_s for run, given in fleet.given.items()}
         self._kept_runs = frozenset(self._runs)
         self._queue.runs = {run: given.held for run, given in fleet.given.items()}
-        if self._queue.runs_left:  # its hours may have changed since
-            self._starts_by_hours = [drone for drone in drones.values() if drone.may_start]
-            for drone in self._starts_by_hours:
-                drone.may_start = False
+        self._untold_runs = self._queue.runs_left
+        self._may_leave = all(told.unattended_start for told in floor.floors.values())
         await self._begin(made, drones, pace_of(floor.standings.values()))
 
     async def _made(self, floors: Mapping[str, FloorStatus], stands: Mapping[str, str]) -> FleetFloor:
@@ -250,6 +250,7 @@ class OwnFleet(VehicleSides):
 
     async def _begin(self, floor: FleetFloor, drones: Mapping[str, FleetDrone], pace: Pace) -> None:
         self._traffic, self._fleet = None, (floor, drones, pace)
+        self._let_start()
         closed = self._closures
         made = partial(
             StationTraffic,
@@ -385,9 +386,8 @@ class OwnFleet(VehicleSides):
         known = {**self._queue.runs, **why_not}
         self._queue.runs = {run: known[run] for run in known if run in self._runs}
         self._over = dict(over)
-        for drone in self._starts_by_hours:
-            drone.may_start = True
-        self._starts_by_hours.clear()
+        self._untold_runs &= self.runs_left - why_not.keys() - over.keys()
+        self._let_start()
 
     @property
     def _given_runs(self) -> dict[str, KeptRun]:
@@ -406,11 +406,17 @@ class OwnFleet(VehicleSides):
         return tuple(node for node in nodes if node not in done)
 
     def _asked_traffic(self) -> StationTraffic:
-        """Of which a person asks something: drones may leave the ground for it."""
-        traffic = self._flying()
-        for each in self._fleet[1].values() if self._fleet is not None else ():
-            each.may_start = True
+        """Of which a person asks something: drones may leave the ground for it, and begin nothing of a run
+        whose hours are not told again."""
+        traffic, untold = self._flying(), self._untold_runs
+        self._queue.runs = {run: why for run, why in self._queue.runs.items() if run not in untold}
+        self._may_leave, self._untold_runs = True, frozenset()
+        self._let_start()
         return traffic
+
+    def _let_start(self) -> None:
+        for each in self._fleet[1].values() if self._fleet is not None else ():
+            each.may_start = self._may_leave and not self._untold_runs
 
     def _flying(self) -> StationTraffic:
         if self._traffic is None:

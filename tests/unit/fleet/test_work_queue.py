@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from flightd.fleet.traffic.work_queue import NodeWork, TourTimes, Value, WorkQueue
+from flightd.fleet.traffic.work_queue import HOURS_UNKNOWN, NodeWork, TourTimes, Value, WorkQueue
 
 HOP_MS = 2_000
 
@@ -176,7 +176,8 @@ def test_work_of_a_run_is_begun_in_its_hours_alone_unless_somebody_else_asks_for
         assert nodes == queue.ready
         return nodes
 
-    assert begun() == ("A3",), "nothing is known of the run"
+    assert begun() == ("A3",)
+    assert queue.held == dict.fromkeys(("A1", "A2"), HOURS_UNKNOWN)
     queue.runs = {"run-1": "these are quiet hours"}
     assert queue.held == dict.fromkeys(("A1", "A2"), "these are quiet hours")
     levels_at(queue, "A2")

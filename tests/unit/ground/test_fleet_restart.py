@@ -209,6 +209,29 @@ def test_nobody_leaves_the_ground_for_what_a_station_before_was_asked_for(tmp_pa
     fly(go, memory=FleetMemory(tmp_path))
 
 
+def test_nor_once_the_drones_have_another_map(tmp_path: Path) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        for drone in fleet.drones.values():
+            drone.never_starts = True
+        fleet.own.ask(["A3"])
+        await asyncio.sleep(5.0)
+        await fleet.kill()
+        fleet.start_again()
+        await until(lambda: fleet.state["flies"])
+        await until(lambda: all(fleet.flown(name) for name in fleet.drones))
+        for name, drone in fleet.drones.items():
+            drone.site, drone.never_starts = hall(name, "hall 2"), False
+            drone.begin_anew()
+        await until(lambda: fleet.own.site == "hall 2", 60)
+        await asyncio.sleep(30.0)
+        assert fleet.state["open"] == ["A3"]
+        assert {drone.phase for drone in fleet.drones.values()} == {Phase.PREFLIGHT}
+        fleet.own.ask(["B3"])
+        await until_done(fleet, "A3 B3")
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
 def test_a_station_that_dies_as_it_begins_by_another_map_leaves_the_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -21,7 +21,7 @@ from flightd.adapters.ground_link.messages.published import StatusReport
 from flightd.core.errors import UnavailableError
 from flightd.core.types import Phase
 from flightd.fleet.traffic.valued_work import PlaceFacts
-from flightd.fleet.traffic.work_queue import Value
+from flightd.fleet.traffic.work_queue import HOURS_UNKNOWN, Value
 from flightd.ground.fleet.fleet_memory import TOO_OLD, FleetMemory
 from flightd.ground.missions.mission_book import Mission, MissionBook
 from flightd.ground.schedules.kept import CountAisles, CountByValue, CountMission, Kept, QuietHours
@@ -286,6 +286,30 @@ def test_quiet_hours_keep_drones_from_leaving_for_what_was_handed_over_before(tm
         await until(lambda: {*fleet.state["given"]} == {"A3"}, 30)
         await station.look(DUE + timedelta(minutes=60))
         await until(lambda: {*fleet.state["given"], *fleet.state["done"]} >= {"A2", "A4"}, 100)
+
+    night(tmp_path, go, HELD)
+
+
+def test_who_asks_as_a_station_begins_lets_nobody_leave_for_a_run_whose_hours_are_not_looked_at_yet(
+    tmp_path: Path,
+) -> None:
+    async def go(station: Station) -> None:
+        fleet = station.fleet
+        await given_to_nobody(station)
+        await fleet.kill()
+        fleet.start_again()
+        await until(lambda: fleet.state["flies"], 60)
+        await charged(station)
+        assert (fleet.state["given"], fleet.state["not_done"]) == ({}, {})
+        fleet.own.ask(["B3"])
+        assert fleet.state["not_done"] == dict.fromkeys(AISLE, HOURS_UNKNOWN)
+        await until(lambda: {*fleet.state["given"]} == {"B3"}, 30)
+        station.begin()
+        await station.look(DUE + timedelta(minutes=10))
+        assert fleet.state["not_done"] == dict.fromkeys(AISLE, "these are quiet hours")
+        await until(lambda: fleet.state["done"] == ["B3"], 100)
+        await station.look(DUE + timedelta(minutes=60))
+        await until(lambda: {*fleet.state["given"]} >= {"A2", "A4"}, 100)
 
     night(tmp_path, go, HELD)
 
