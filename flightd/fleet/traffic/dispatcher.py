@@ -38,7 +38,8 @@ class DroneReport:
     """What a drone tells: how many actions of its life are done, its charge, by how much its position is
     doubted, and whether it is unable to fly on; `not_counted` has the nodes at which a count failed, and
     why.  `charging`: whether it is charged where it stands, None where it does not say; `level`: how full
-    its battery is for a dock, where `charge` tells something else."""
+    its battery is for a dock, where `charge` tells something else; `may_start`: somebody may send it on from
+    where it stands."""
 
     drone: str
     done: int
@@ -48,6 +49,7 @@ class DroneReport:
     not_counted: Mapping[str, str] = field(default_factory=dict)
     charging: bool | None = None
     level: float | None = None
+    may_start: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +86,7 @@ class Dispatcher:
         full = endurance.starts_at if full_at is None else full_at
         self.docks = DockQueue(control, self._distances, self._open_ways, docks, full, returns=keep_home)
         self._level: dict[str, float] = {}
+        self._grounded: set[str] = set()
         self._charging: dict[str, bool | None] = {}
         self._charge: dict[str, float] = {}
         self._tours: dict[str, set[str]] = {}
@@ -202,6 +205,7 @@ class Dispatcher:
         drone, course = report.drone, self.control.drones[report.drone]
         self._charge[drone], self._charging[drone] = report.charge, report.charging
         self._level[drone] = report.charge if report.level is None else report.level
+        (self._grounded.discard if report.may_start else self._grounded.add)(drone)
         self._heard_ms[drone] = now_ms
         if drone in self._avoided and not course.failed:
             counts = [action.vertex for action in course.base if action.act is Act.COUNT]
@@ -332,11 +336,13 @@ class Dispatcher:
             self._replanned(flying, now_ms)
 
     def _comes_home(self, drone: str, vertex: int, after_ms: int) -> bool:
-        """Whether the battery brings a drone home from the end of a base; who has nothing left to count goes
-        on, home or to a dock (`DockQueue.turn_back`)."""
+        """Whether a drone may start, and its battery brings it home from the end of a base; who has nothing
+        left to count goes on, home or to a dock (`DockQueue.turn_back`)."""
         course = self.control.drones[drone]
         if not course.stops:
             return True
+        if drone in self._grounded:
+            return False
         home_ms = self._open_ways.ms(drone, vertex, course.ends)
         return _SLOWER * (after_ms + home_ms) <= self._left_ms(drone)
 
@@ -366,7 +372,8 @@ class Dispatcher:
                 and (drone not in self._held or self.control.is_cut_off(drone))
                 and (works or drone in holders or vertices[course.place].pad is None)
             ):
-                known[drone] = Standing(self._level[drone], self._charging[drone])
+                may_start = drone not in self._grounded
+                known[drone] = Standing(self._level[drone], self._charging[drone], may_start)
                 spared_ms = self._endurance.left_ms(self._charge[drone]) - _SPARE_MS
                 left_ms[drone] = int(spared_ms / _WITH_SPARE)
         self.docks.step(now_ms, known, left_ms)
@@ -415,7 +422,7 @@ class Dispatcher:
         """Whether a drone has nothing to do, and a battery to do something."""
         course = self.control.drones[drone]
         idle = not course.ahead and not course.failed and course.doubt_m <= 0.0
-        idle &= drone not in self._held and drone not in self._comes_back
+        idle &= drone not in self._held | self._comes_back | self._grounded
         return idle and self._charge.get(drone, 0.0) >= self._endurance.starts_at
 
     def _give_tour(self, drone: str, now_ms: int, among: int) -> bool:

@@ -34,10 +34,12 @@ _HOVERS_MS: Final = 1_000
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """What is known of a drone: its charge, and whether it says that it is being charged."""
+    """What is known of a drone: its charge, whether it says that it is being charged, and whether it may be
+    sent on from where it stands."""
 
     charge: float
     charging: bool | None
+    may_start: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,8 +215,8 @@ class DockQueue:
         shut = frozenset().union(*map(self._control.avoided, self._control.drones))
         for drone, standing in known.items():
             course = self._control.drones[drone]
-            wants = not course.stops and standing.charge < self._full_enough and self._dock_of(drone) is None
-            if not wants:
+            is_low = standing.charge < self._full_enough and standing.may_start
+            if course.stops or not is_low or self._dock_of(drone) is not None:
                 self._since_ms.pop(drone, None)
                 continue
             self._since_ms.setdefault(drone, now_ms)
@@ -242,12 +244,11 @@ class DockQueue:
     def _send(
         self, waiting: Sequence[Waiting], known: dict[str, Standing], left_ms: dict[str, int], now_ms: int
     ) -> None:
-        free_ms = {name: self._free_in_ms(name, known, left_ms) for name in self._docks}
+        free_ms = {name: self._free_in_ms(name, known) for name in self._docks}
         for drone, dock in chosen_docks(self._docks.values(), free_ms, waiting).items():
             holder = self._holder.get(dock.name)
             if holder is not None:
-                if left_ms.get(holder, 0) > 0:  # not one that nobody may send anywhere
-                    self._make_room(holder, dock, known, now_ms)
+                self._make_room(holder, dock, known, now_ms)
             elif not self._is_early(drone, now_ms):
                 self._next_try_ms[drone] = now_ms + _RETRY_MS
                 if self._fly_to(drone, dock, left_ms[drone], now_ms):
@@ -267,20 +268,21 @@ class DockQueue:
     def _make_room(self, holder: str, dock: Dock, known: dict[str, Standing], now_ms: int) -> None:
         """Who is charged, and has nothing to do, goes home for whoever waits."""
         course = self._control.drones[holder]
-        charged = holder in known and known[holder].charge >= self._full_enough
-        if charged and not course.ahead and course.place == dock.place and not self._is_early(holder, now_ms):
+        standing = known.get(holder)
+        may_go = standing is not None and standing.may_start and standing.charge >= self._full_enough
+        if may_go and not course.ahead and course.place == dock.place and not self._is_early(holder, now_ms):
             self._next_try_ms[holder] = now_ms + _RETRY_MS
             self._go_home(holder, now_ms)
 
-    def _free_in_ms(self, name: str, known: dict[str, Standing], left_ms: Mapping[str, int]) -> int:
+    def _free_in_ms(self, name: str, known: dict[str, Standing]) -> int:
         holder = self._holder.get(name)
         if holder is None:
             return 0
         dock, course = self._docks[name], self._control.drones[holder]
         standing = known.get(holder)
         charge = 0.0 if standing is None else standing.charge
-        if charge >= self._full_enough and left_ms[holder] <= 0:
-            charge = 0.0  # who may not be sent anywhere stays for nobody knows how long
+        if standing is not None and not standing.may_start and charge >= self._full_enough:
+            charge = 0.0  # it stays for nobody knows how long
         return self._distances.to(dock.place)[course.place] + dock.service_ms(charge) + _LEAVES_MS
 
     def _is_early(self, drone: str, now_ms: int) -> bool:

@@ -198,12 +198,17 @@ class FleetDrone:
         charge = RESERVE + left_s / FLIGHT_S
         ready = status is not None and CommandKind.START in status.possible and standing is not None
         ready &= self.may_start and self.charges_to is None
-        if self.waits and not self._base and not ready:
-            charge = 0.0  # nobody sends it anywhere
+        may_start = ready or bool(self._base) or not self.waits
         self.air.doubt_m = self._doubt_m(status)
         failed = dict(self._not_counted)
         return DroneReport(
-            self.name, self._done, charge, self.air.doubt_m, not_counted=failed, level=self._level
+            self.name,
+            self._done,
+            charge,
+            self.air.doubt_m,
+            not_counted=failed,
+            level=self._level,
+            may_start=may_start,
         )
 
     def _doubt_m(self, status: StatusReport | None) -> float:

@@ -29,10 +29,10 @@ def charge_for(left_s: float) -> float:
 class Steps:
     """A dispatcher a second at a time, by drones that do an action in each, or `wait`."""
 
-    def __init__(self, dispatcher: Dispatcher, **levels: float) -> None:
+    def __init__(self, dispatcher: Dispatcher, grounded: str = "") -> None:
         self.dispatcher = dispatcher
-        self.levels = levels
-        """Of their batteries, where their charges tell something else."""
+        self.grounded = grounded
+        """Nobody may send this one anywhere."""
         self.now_ms = 0
 
     def go(self, charges: Mapping[str, float], *, wait: bool = False) -> None:
@@ -40,7 +40,7 @@ class Steps:
         for drone, charge in charges.items():
             course = self.dispatcher.control.drones[drone]
             done = course.done + (bool(course.base) and not wait)
-            reports.append(DroneReport(drone, done, charge, level=self.levels.get(drone)))
+            reports.append(DroneReport(drone, done, charge, may_start=drone != self.grounded))
         self.now_ms += 1000
         self.dispatcher.step(self.now_ms, reports)
 
@@ -91,10 +91,10 @@ def test_a_dock_that_who_is_charged_may_not_leave_is_not_waited_for_while_anothe
     control.enter("d1", pads["DAB10"])
     docks = [Dock(node, pads[node], DockKind.CONTACT, 1800.0) for node in ("DAA10", "DAB1")]
     queue = work("A6")
-    steps = Steps(Dispatcher(control, queue, Endurance(FULL_S), docks=docks, keep_home=True), d0=1.0)
+    steps = Steps(Dispatcher(control, queue, Endurance(FULL_S), docks=docks, keep_home=True), grounded="d0")
     while not queue.done:
-        steps.go({"d0": 0.0, "d1": 1.0})
-    steps.all(20, {"d0": 0.0, "d1": 0.85}, wait=True)
+        steps.go({"d0": 1.0, "d1": 1.0})
+    steps.all(20, {"d0": 1.0, "d1": 0.85}, wait=True)
     assert steps.dispatcher.docks.holders == {"DAA10": "d0", "DAB1": "d1"}
 
 

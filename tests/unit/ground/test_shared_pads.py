@@ -7,6 +7,8 @@ import asyncio
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from flightd.core.types import Phase
 from flightd.ground.fleet.fleet_memory import FleetMemory
 from tests.rigs.paper_fleet import PaperFleet, fly, until
@@ -117,6 +119,20 @@ def test_who_is_charged_and_may_not_be_sent_anywhere_keeps_the_pad_until_he_may(
         await until(lambda: a.phase is Phase.DONE, 300)
 
     fly(go, "ab", docks=DOCKS)
+
+
+def test_who_is_low_and_may_not_start_is_not_told_as_out_of_reach(caplog: pytest.LogCaptureFixture) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        a = fleet.drones["a"]
+        a.battery_frac, a.obstacles = 0.5, ("the aisle is not closed",)
+        fleet.own.ask(["A3"], "a")
+        await asyncio.sleep(30.0)
+        assert (a.phase, fleet.state["open"]) == (Phase.PREFLIGHT, ["A3"])
+        a.obstacles = ()
+        await on_dock(fleet, "a")
+
+    fly(go, "ab", docks=DOCKS)
+    assert not [record.message for record in caplog.records if "reaches no dock" in record.message]
 
 
 def test_what_a_drone_chooses_by_itself_frees_the_pad_that_was_promised() -> None:
