@@ -91,7 +91,7 @@ def study(
         raise InputError("is for --engine ray alone", key="--address")
     chosen, sources = chosen_studies(studies), log_sources(paths)
     if inventory is not None:
-        sources = [replace(source, inventory=str(inventory.resolve())) for source in sources]
+        sources = _counted_into(inventory, sources, chosen)
     file = None if out is None else FindingsFile(out)
     found: dict[int, LogFindings] = {}
     ended: BaseException | None = None
@@ -118,6 +118,19 @@ def study(
         raise RunError(f"{failed} of {len(ordered)} logs differ or could not be studied")
 
 
+def _counted_into(inventory: Path, sources: list[LogSource], studies: tuple[Study, ...]) -> list[LogSource]:
+    """InputError for a folder that is none of an inventory, or that nobody would read."""
+    from flightd.app.log_study.finding import Study
+
+    if Study.CODES not in studies:
+        raise InputError("is for the study codes alone", key="--inventory", remedy="add it: --with codes")
+    found = [replace(source, inventory=str(inventory.resolve())) for source in sources]
+    if not os.access(found[0].inventory_file, os.R_OK):
+        what, remedy = "holds no inventory.db that can be read", "give the folder that flights counted into"
+        raise InputError(what, file=inventory, key="--inventory", remedy=remedy)
+    return found
+
+
 def _studied(
     sources: list[LogSource], chosen: tuple[Study, ...], engine: Engine, workers: int | None, address: str
 ) -> Iterator[tuple[int, LogFindings]]:
@@ -125,11 +138,10 @@ def _studied(
     from flightd.app.log_study.ray_engine import run_ray
     from flightd.studies.progress_bar import track
 
-    width = min(workers or os.cpu_count() or 1, len(sources))
     with contextlib.closing(
-        run_local(sources, chosen, width)
+        run_local(sources, chosen, min(workers or os.cpu_count() or 1, len(sources)))
         if engine is Engine.LOCAL
-        else run_ray(sources, chosen, width, address=address)
+        else run_ray(sources, chosen, workers, address=address)
     ) as running:
         yield from track(running, "studying", len(sources))
 

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from flightd.app.recording import SETTING_TOPICS, recorded_setting
-from flightd.app.simulation.simulation import Simulation
+from flightd.app.simulation.simulation import FLIGHT_LOG, Simulation
 from flightd.core.errors import InputError
 from flightd.core.topics import Document, Topic
 from flightd.replay.log import FlightLog, read_log
@@ -19,9 +19,10 @@ from flightd.sim.unknowns import Unknowns
 
 def recorded_simulation(log: Path) -> tuple[Simulation, dict[str, Any]] | None:
     """The simulation that wrote `log`, and the summary that it left; None where no `truth.mcap` and
-    `summary.json` lie beside it.  InputError for files that do not hold what they should."""
+    `summary.json` of it lie beside it, or those are of a flight of another name.  InputError for files that
+    do not hold what they should."""
     truth, summary = log.with_name("truth.mcap"), log.with_name("summary.json")
-    if not truth.exists() or not summary.exists():
+    if log.name != FLIGHT_LOG or not truth.exists() or not summary.exists():
         return None
     told = _summary(summary)
     recorded = read_log(log, {Topic.SCENARIO, *SETTING_TOPICS})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -18,7 +19,8 @@ from flightd.runtime.remote_files import close_files, file_system, url_of
 _ENDING: Final = ".mcap"
 _TRUTH: Final = "truth"
 """The simulator's own log beside that of a flight is not one."""
-_INVENTORY: Final = ("inventory.db", "inventory.db-wal", "inventory.db-shm")
+_DATABASE: Final = "inventory.db"
+_INVENTORY: Final = (_DATABASE, f"{_DATABASE}-wal", f"{_DATABASE}-shm")
 _BESIDE: Final[Mapping[Study, Sequence[str]]] = MappingProxyType(
     {Study.CODES: _INVENTORY, Study.JUDGE: ("truth.mcap", "summary.json", *_INVENTORY)}
 )
@@ -41,16 +43,23 @@ class LogSource:
         """A path of this machine's."""
         return "://" not in self.place
 
+    @property
+    def inventory_file(self) -> str:
+        """The database in `inventory`."""
+        return str(Path(self.inventory) / _DATABASE)
+
     @contextlib.contextmanager
     def fetched(self, studies: Collection[Study]) -> Iterator[Path]:
         """The log as a file with what of its flight lies beside it; gone afterwards if it had to be fetched,
-        which is done with what these `studies` read alone."""
+        which is done with what these `studies` read alone: nothing for codes, where the inventory lies
+        elsewhere."""
         if self.is_local:
             yield Path(self.place)
             return
+        read = [study for study in studies if not (self.inventory and study is Study.CODES)]
         with TemporaryDirectory(prefix="flightd-study-") as made:
             with _opened(self.place, "cannot be fetched") as (files, path):
-                _fetch(files, path, Path(made), studies)
+                _fetch(files, path, Path(made), read)
             yield Path(made) / PurePosixPath(path).name
 
 
@@ -67,15 +76,26 @@ def log_sources(places: Sequence[str]) -> list[LogSource]:
     return sorted(found.values(), key=lambda source: source.name)
 
 
-def _local(path: Path) -> Iterator[LogSource]:
-    if path.is_file():
-        yield LogSource(str(path), str(path.resolve()))
-        return
-    if not path.is_dir():
-        raise InputError("is neither a log nor a folder", file=path)
-    for log in sorted(path.rglob(f"*{_ENDING}")):
-        if _is_flight(log.name) and log.is_file():
-            yield LogSource(str(log), str(log.resolve()))
+def _local(path: Path) -> list[LogSource]:
+    """InputError for a folder that cannot be looked through: flights would be missing without a word."""
+    try:
+        if not path.is_file() and not path.is_dir():
+            raise InputError("is neither a log nor a folder", file=path)
+        logs = [path] if path.is_file() else sorted(_logs_below(path))
+        return [LogSource(str(log), str(log.resolve())) for log in logs]
+    except OSError as err:
+        what = f"cannot be looked through: {err.strerror or err}"
+        remedy = "take a user who may, or name the folders beside it"
+        raise InputError(what, file=err.filename or path, remedy=remedy) from None
+
+
+def _logs_below(folder: Path) -> Iterator[Path]:
+    def ended(err: OSError) -> None:
+        raise err
+
+    for place, _, names in os.walk(folder, onerror=ended):
+        logs = (Path(place, name) for name in names if _is_flight(name))
+        yield from (log for log in logs if log.is_file())
 
 
 def _remote(url: str) -> Iterator[LogSource]:

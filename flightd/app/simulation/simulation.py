@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.required_parameters import FIRMWARES, Job, advice_for, rules_for
@@ -25,6 +26,9 @@ from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.unknowns import NOTHING, Unknowns
 from flightd.sim.world import FrontSpec, WorldSpec
 from flightd.site.site import Site
+
+FLIGHT_LOG: Final = "flight.mcap"
+"""What the simulator calls the log of the flight in its folder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +51,7 @@ class Simulation:
 
     @property
     def flight_log(self) -> Path:
-        return self.folder / "flight.mcap"
+        return self.folder / FLIGHT_LOG
 
     @property
     def truth_log(self) -> Path:

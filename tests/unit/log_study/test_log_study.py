@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import multiprocessing
@@ -9,27 +10,33 @@ import re
 import shutil
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
 
+from flightd import __version__
 from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.app.log_study import ray_cluster
 from flightd.app.log_study.engines import Work, run_local, study_source
 from flightd.app.log_study.finding import LogFindings, Outcome, Study
 from flightd.app.log_study.ray_engine import run_ray
 from flightd.app.log_study.sources import LogSource, log_sources
 from flightd.config.schema import load_config
+from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import LocationState
 from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.replay.log import read_log
 from tests.command import Command
 from tests.replay.synthetic_flight import write_flight
 from tests.rigs.extras import of_extra
-from tests.unit.log_study.dying_work import always_dies, dies_once, fails
+from tests.rigs.somebody_else import as_somebody_else
+from tests.unit.log_study.dying_work import always_dies, dies_once, fails, works_alone
 from tests.web.stock_rig import code, look, picture_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -112,6 +119,9 @@ def test_a_flight_of_today_is_seen_decided_and_judged_as_it_was(
     ended = flightd("study", other / "flight.mcap", "--with", "judge")
     assert ended.returncode == 1
     assert "cross_track_rms_m" in ended.stdout
+    shutil.copyfile(other / "flight.mcap", other / "another.mcap")
+    ended = flightd("study", other / "another.mcap", "--with", "judge", "--json")
+    assert json.loads(ended.stdout)["outcomes"]["judge"] == {"nothing": 1}, "it is judged by its own truth"
 
 
 def test_a_flights_labels_are_those_of_its_own_run_wherever_its_inventory_is(
@@ -209,17 +219,6 @@ def test_who_stops_asking_ends_the_workers(flights: Path) -> None:
     assert not {*multiprocessing.active_children()} - others
 
 
-def test_ray_finds_the_same_byte_for_byte_though_a_worker_is_killed(
-    flights: Path, alone: str, tmp_path: Path
-) -> None:
-    of_extra("ray", "ray")
-    shutil.copytree(flights, tmp_path / "flights")
-    sources = log_sources([str(tmp_path / "flights")])
-    right = alone.replace(str(flights), str(tmp_path / "flights"))
-    (tmp_path / "flights" / "b" / "dies once").touch()
-    assert told(sources, run_ray(sources, STUDIES, 2, dies_once)) == right
-
-
 def test_logs_are_fetched_from_wherever_fsspec_finds_them(flights: Path) -> None:
     here = log_sources([str(flights)])
     there = log_sources([f"file://{flights}"])
@@ -247,19 +246,22 @@ def test_of_a_folder_of_many_logs_only_what_belongs_to_one_is_fetched(
         files.pipe_file(f"/flat/{name}", f"what is in {name}".encode())
     monkeypatch.setattr(MemoryFileSystem, "open", noted)
     inventory = {"inventory.db", "inventory.db-wal"}
-    reads: tuple[tuple[tuple[Study, ...], set[str]], ...] = (
-        ((Study.DETECT, Study.REPLAY, Study.CALIBRATE), set()),
-        ((Study.JUDGE,), {"summary.json", "truth.mcap", *inventory}),
-        ((Study.CODES,), {"evidence/ab/abcd.jpg", *inventory}),
-        ((Study.CODES, Study.JUDGE), beside),
+    judged = {"summary.json", "truth.mcap", *inventory}
+    reads: tuple[tuple[str, tuple[Study, ...], set[str]], ...] = (
+        ("", (Study.DETECT, Study.REPLAY, Study.CALIBRATE), set()),
+        ("", (Study.JUDGE,), judged),
+        ("", (Study.CODES,), {"evidence/ab/abcd.jpg", *inventory}),
+        ("", (Study.CODES, Study.JUDGE), beside),
+        ("/another", (Study.CODES, Study.REPLAY), set()),
+        ("/another", (Study.CODES, Study.JUDGE), judged),
     )
     try:
         sources = log_sources(["memory://flat"])
         assert len(sources) == 6
         assert read == []
-        for source, (studies, wanted) in itertools.product(sources, reads):
+        for source, (another, studies, wanted) in itertools.product(sources, reads):
             read.clear()
-            with source.fetched(studies) as log:
+            with replace(source, inventory=another).fetched(studies) as log:
                 here = {str(path.relative_to(log.parent)) for path in log.parent.rglob("*") if path.is_file()}
                 assert log.read_text() == "what is in " + source.place.removeprefix("memory:///flat/")
             there = {"summary.json"} if source.place.endswith("/a/flight.mcap") else beside
@@ -275,6 +277,11 @@ def test_of_a_folder_of_many_logs_only_what_belongs_to_one_is_fetched(
         (("--with", "replay,guess"), "--with guess: no such study; choose of detect, replay, codes"),
         (("--with", ","), "--with: names no study"),
         (("--address", "ray://x:1"), "--address: is for --engine ray alone"),
+        (("--inventory", "."), "--inventory: is for the study codes alone; add it: --with codes"),
+        (
+            ("--with", "codes", "--inventory", "."),
+            "--inventory: holds no inventory.db that can be read; give the folder",
+        ),
     ],
 )
 def test_what_is_not_there_is_one_line(
@@ -290,3 +297,90 @@ def test_a_place_without_a_log_is_named(flightd: Command, tmp_path: Path) -> Non
     assert "holds no flight log" in flightd("study", tmp_path).stderr
     assert "is neither a log nor a folder" in flightd("study", tmp_path / "nowhere").stderr
     assert "cannot be opened" in flightd("study", "nonsense://x/y").stderr
+
+
+def test_a_folder_that_cannot_be_looked_through_is_named() -> None:
+    with TemporaryDirectory() as made:
+        hall, closed = Path(made), Path(made) / "b" / "closed"
+        for folder in (hall / "a", closed):
+            folder.mkdir(parents=True)
+            (folder / "flight.mcap").touch()
+        hall.chmod(0o755)
+        closed.chmod(0)
+        for asked, named in ((hall, closed), (closed, closed), (closed / "flight.mcap",) * 2):
+            with pytest.raises(InputError) as refused, as_somebody_else():
+                log_sources([str(asked)])
+            assert str(refused.value).startswith(f"{named}: cannot be looked through: Permission denied; ")
+        assert len(log_sources([str(hall / "a")])) == 1
+        closed.chmod(0o700)
+
+
+@pytest.fixture(scope="module")
+def on_ray(
+    flights: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[list[LogSource], list[tuple[int, LogFindings]]]]:
+    """What a study on a Ray that was begun for it found though a worker was killed; it is there still."""
+    of_extra("ray", "ray")
+    folder = tmp_path_factory.mktemp("ray")
+    shutil.copytree(flights, folder, dirs_exist_ok=True)
+    (folder / "b" / "dies once").touch()
+    sources = log_sources([str(folder)])
+    with contextlib.closing(run_ray(sources, STUDIES, 2, dies_once)) as running:
+        yield sources, [next(running) for _ in sources]
+
+
+def on_cluster(sources: list[LogSource], work: Work = study_source, workers: int | None = None) -> list[str]:
+    """What is found as if somebody else had begun the Ray that is there."""
+    found = dict(run_ray(sources, (Study.CODES,), workers, work, address="ray://head:10001"))
+    return [found[number].findings[Study.CODES].text for number in range(len(sources))]
+
+
+def test_ray_finds_the_same_byte_for_byte_though_a_worker_is_killed(
+    on_ray: tuple[list[LogSource], list[tuple[int, LogFindings]]], flights: Path, alone: str
+) -> None:
+    sources, found = on_ray
+    assert told(sources, iter(found)) == alone.replace(str(flights), str(Path(sources[0].place).parents[1]))
+
+
+@pytest.mark.usefixtures("on_ray")
+def test_each_node_is_asked_first_for_its_flightd_and_for_what_is_read_there_by_its_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refusal(kind: type[FlightdError], source: LogSource) -> str:
+        with pytest.raises(kind) as refused:
+            on_cluster([source])
+        return str(refused.value)
+
+    for name in "ab":
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "flight.mcap").write_bytes(b"no log at all")
+    (tmp_path / "b" / "fails").touch()
+    sources = log_sources([str(tmp_path)])
+    assert on_cluster(sources, fails) == [
+        "no inventory beside it; say where it is: --inventory FOLDER", "ZeroDivisionError: division by zero",
+    ]  # fmt: skip
+
+    gone = LogSource("gone", f"{tmp_path}/gone.mcap")
+    assert refusal(InputError, gone).startswith(f"{tmp_path}/gone.mcap: is not on node ")
+    for source in (sources[0], LogSource("far", "memory://far/flight.mcap")):
+        said = refusal(InputError, replace(source, inventory=f"{tmp_path}/stock"))
+        assert said.startswith(f"{tmp_path}/stock/inventory.db: --inventory: is not on node "), said
+    monkeypatch.setattr(ray_cluster, "__version__", "9.0")
+    said = refusal(UnavailableError, gone)
+    assert re.match(rf"--address ray://head:10001: node \S+ has flightd {__version__}; install", said)
+
+
+@pytest.mark.usefixtures("on_ray")
+def test_a_node_that_is_gone_when_it_is_asked_is_none_that_works() -> None:
+    ray = of_extra("ray", "ray")
+    (node,) = ray.nodes()
+    gone = {**node, "NodeID": "0" * len(node["NodeID"]), "NodeManagerAddress": "gone"}
+    looks = list(ray_cluster.node_looks(ray, [gone, node], ["/"], "--engine ray"))
+    assert looks == [ray_cluster.NodeLook(node["NodeManagerAddress"], __version__, "")]
+
+
+@pytest.mark.usefixtures("on_ray")
+def test_no_more_logs_are_worked_on_at_a_time_than_was_asked_for(tmp_path: Path) -> None:
+    sources = [LogSource(str(number), str(tmp_path / "flight.mcap")) for number in range(6)]
+    (tmp_path / "flight.mcap").touch()
+    assert on_cluster(sources, works_alone, workers=1) == [""] * len(sources)

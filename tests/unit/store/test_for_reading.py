@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 import resource
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 
@@ -20,8 +18,7 @@ from flightd.adapters.store.unavailable import InventoryUnavailableError
 from flightd.cli.main import app
 from flightd.core.errors import InputError
 from flightd.core.inventory import LocationState, Observation, PlannedLocation
-
-NOBODY = 65534
+from tests.rigs.somebody_else import as_somebody_else
 
 
 @pytest.fixture
@@ -40,20 +37,6 @@ def store(folder: Path) -> Path:
         name = store.keep_evidence(b"\xff\xd8 a picture")
         store.commit(Observation("r", "A-01", 1, LocationState.EMPTY, 0.9, evidence=name))
     return stock
-
-
-@contextmanager
-def as_somebody_else() -> Iterator[None]:
-    """Meanwhile this process is a user who owns nothing; one that is no superuser is stopped as it is.  What
-    it imports must be there already, for that may lie where only the superuser reads."""
-    if os.geteuid() != 0:
-        yield
-        return
-    os.seteuid(NOBODY)
-    try:
-        yield
-    finally:
-        os.seteuid(0)
 
 
 def run(*words: str | Path) -> Result:
