@@ -135,7 +135,7 @@ async def test_stock_comes_in_and_what_a_person_approves_is_booked_once(
         assert await connector("expected") == 0, connector.said
         assert connector.lines == [
             "odoo-stock.csv: 6 labels at 10 places",
-            "left out: locations without a barcode: 1",
+            "left out: locations with others below them: 1",
             "left out: Wire at AL-04-1-1: no label names it; give the product a barcode",
         ]
         shown = await compared(connector)
@@ -243,10 +243,12 @@ async def test_nothing_is_booked_of_stock_that_changed_and_what_was_cut_is_finis
         odoo.instead = {apply: odoo.refusal("a proxy without its server")}
         assert await connector("apply", *approve) == 2
         assert "Odoo cannot answer now (HTTP 502)" in connector.lines[-1]
-        conflict = {"name": "Conflict in Inventory Adjustment", "type": "ir.actions.act_window"}
-        odoo.instead = {apply: Answer(200, conflict)}
+        odoo.instead = {apply: odoo.refusal("a count that is outdated")}
         assert await connector("apply", *approve) == 1
         assert "but asks: Conflict in Inventory Adjustment" in connector.said
+        odoo.instead = {apply: odoo.refusal("a record that is gone")}
+        assert await connector("apply", *approve) == 1
+        assert "Odoo has it no more: Record does not exist or has been deleted." in connector.lines[0]
         odoo.instead = {}
         assert await connector("apply", "--set-only", *approve) == 0
         assert connector.lines == ["AL-02-1-1 PAL-3 5 -> 0: set: apply it in Odoo under Physical Inventory"]
@@ -262,11 +264,14 @@ async def test_a_bad_answer_is_one_line_with_what_to_do(
     half = Answer(200, [{"id": 8, "name": "Stock"}])
     refusals = {
         "a user who may not": "Odoo forbids /json/2/stock.location/search_read: You are not allowed to "
-        "access 'Quants' (stock.quant) records.",
+        "access 'Inventory Locations' (stock.location) records.",
         "a model that Odoo does not know": "the model 'stock.location' does not exist; is the app Inventory",
         "a rule against it": "(HTTP 422): Quant's editing is restricted",
         "a fault of its own": "could not serialize access due to concurrent update; try again later",
         "no JSON-2 API": "there is no JSON-2 API; it needs Odoo 19 or later",
+        "no such database": "there is no JSON-2 API; it needs Odoo 19 or later; correct odoo.url",
+        "an Odoo 18": "the address leads elsewhere; give the address that it leads to, with https:// if that "
+        "is it; Odoo 18 leads to its login",
         "a page of the proxy": "with a web page that is no JSON; is that its own address",
         "a proxy without its server": "Odoo cannot answer now (HTTP 502); try again later",
         "another address": "the address leads elsewhere; give the address",

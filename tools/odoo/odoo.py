@@ -3,7 +3,7 @@
 Chosen of Odoo's three ways in because it is the one that stays: XML-RPC and JSON-RPC are deprecated since 19
 and go with 22.  It has no session and no positional arguments, and says by the HTTP status what was wrong.
 
-Source: Odoo 19 documentation, External JSON-2 API.
+Source: Odoo 19 documentation, External JSON-2 API; a running Odoo 19.0.
 """
 
 from __future__ import annotations
@@ -146,6 +146,10 @@ class Odoo:
 _NEW_KEY = "make one in Odoo: Preferences, Account Security, New API Key (it ends after three months at most)"
 
 
+_GONE = "does not exist or has been deleted"
+"""What Odoo says of a record, in the language of a question that names none."""
+
+
 def _refused(url: str) -> Callable[[Refusal], FlightdError]:
     """What the statuses of the JSON-2 API mean for the person at the connector."""
 
@@ -163,8 +167,10 @@ def _meant(told: Refusal) -> tuple[type[FlightdError], str, str, str]:
         case 401:
             found = (InputError, "Odoo does not take the key", "ODOO_API_KEY", _NEW_KEY)
         case 403:
-            remedy = "give the key's user the right to Inventory (to apply counts: Administrator)"
+            remedy = "give the key's user the right Inventory: User"
             found = (InputError, f"Odoo forbids {told.way}", "ODOO_API_KEY", remedy)
+        case 404 if _GONE in told.said:
+            found = (RunError, "Odoo has it no more", "", "make a new plan")
         case 404 if told.said:
             remedy = "is the app Inventory installed, and odoo.database the right one?"
             found = (InputError, f"Odoo does not know {told.way}", "", remedy)
@@ -172,7 +178,9 @@ def _meant(told: Refusal) -> tuple[type[FlightdError], str, str, str]:
             remedy = "it needs Odoo 19 or later; correct odoo.url or odoo.database"
             found = (InputError, "there is no JSON-2 API", "odoo.url", remedy)
         case status if status < 400:
-            remedy = "give the address that it leads to, with https:// if that is it"
+            remedy = (
+                "give the address that it leads to, with https:// if that is it; Odoo 18 leads to its login"
+            )
             found = (InputError, "the address leads elsewhere", "odoo.url", remedy)
         case 408 | 429 | 500 | 502 | 503 | 504:
             what = f"Odoo cannot answer now (HTTP {told.status})"

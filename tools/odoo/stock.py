@@ -17,9 +17,12 @@ Text: TypeAlias = str | bool
 
 
 class Location(Record, frozen=True):
+    """`location_id` is the one that it lies below."""
+
     name: str
     complete_name: str
     barcode: Text
+    location_id: Named = False
 
 
 class Product(Record, frozen=True):
@@ -154,11 +157,15 @@ def _root(odoo: Odoo, asked: OdooSection) -> int:
 
 
 def _places(odoo: Odoo, asked: OdooSection, root: int, left_out: list[str]) -> dict[str, Location]:
-    """Locations by what a count calls them."""
+    """Locations by what a count calls them.  One with others below it is an area, as that of a warehouse,
+    to which Odoo itself gives a barcode."""
     below: Domain = [["id", "child_of", root], ["usage", "=", "internal"]]
+    found = list(odoo.records("stock.location", Location, below))
+    above = {one.location_id[0] for one in found if isinstance(one.location_id, tuple)}
+    areas = [one for one in found if one.id in above]
     places: dict[str, Location] = {}
     nameless = 0
-    for location in odoo.records("stock.location", Location, below):
+    for location in (one for one in found if one.id not in above):
         place = getattr(location, asked.place)
         if not isinstance(place, str) or not place.strip():
             nameless += 1
@@ -177,6 +184,8 @@ def _places(odoo: Odoo, asked: OdooSection, root: int, left_out: list[str]) -> d
             key="odoo.place",
             remedy="set them in Odoo, or choose another of barcode, name, complete_name",
         )
+    if areas:
+        left_out.append(f"locations with others below them: {len(areas)}")
     if nameless:
         left_out.append(f"locations without a {asked.place}: {nameless}")
     return places

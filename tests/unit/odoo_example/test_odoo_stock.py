@@ -47,7 +47,8 @@ def _is(told: Any, value: Any) -> bool:
 
 
 def _location(number: int, barcode: str | bool) -> dict[str, Any]:
-    return {"id": number, "name": str(barcode), "complete_name": f"WH/{barcode}", "barcode": barcode}
+    named = {"name": str(barcode), "complete_name": f"WH/{barcode}", "barcode": barcode}
+    return {"id": number, "location_id": False, **named}
 
 
 def _quant(number: int, location: int, **given: Any) -> dict[str, Any]:
@@ -60,7 +61,7 @@ def _quant(number: int, location: int, **given: Any) -> dict[str, Any]:
 
 
 def _stock(quants: list[dict[str, Any]], barcode: str | bool = _GTIN) -> OdooStock:
-    root = {"id": 9, "name": "Stock", "complete_name": "WH/Stock", "barcode": False}
+    root = {"id": 9, "name": "Stock", "complete_name": "WH/Stock", "barcode": False, "location_id": False}
     locations = [_location(1, "A-1"), _location(2, "A-2"), _location(3, "A-3"), root]
     product = {"id": 7, "barcode": barcode, "tracking": "serial"}
     odoo = ShelvedOdoo(stock_location=locations, stock_quant=quants, product_product=[product])
@@ -114,6 +115,14 @@ def test_a_package_of_several_products_has_no_quantity_and_what_has_none_left_is
     )
     assert [(one.code, one.quantity) for one in stock.lying] == [("P", 2.0), (_GTIN, 0.0)]
     assert stock.expected == {"A-1": ["P"], "A-2": [], "A-3": []}
+
+
+def test_a_location_with_others_below_it_is_an_area_and_no_place() -> None:
+    hall = _location(1, "WHSTOCK") | {"complete_name": "WH/Stock"}
+    bays = [_location(number, f"A-{number}") | {"location_id": [1, "WH/Stock"]} for number in (2, 3)]
+    stock = read_stock(ShelvedOdoo(stock_location=[hall, *bays], stock_quant=[_quant(1, 1)]), _ASKED)
+    assert stock.expected == {"A-2": [], "A-3": []}
+    assert stock.left_out == ("locations with others below them: 1",)
 
 
 def test_a_label_with_the_bare_number_is_the_same_serial_number() -> None:
