@@ -80,7 +80,8 @@ def comparison_document(comparison: Comparison) -> dict[str, Any]:
 
 
 def replay_decisions(log: FlightLog, step: Step) -> Comparison:
-    """Give `step` (of a fresh pilot) every recorded tick and compare its outputs with the record.
+    """Give `step` (of a fresh pilot) every recorded tick and compare its outputs with the record.  The last
+    tick of a log that was cut off, where that came before its decision, is none of a record with gaps.
 
     InputError if the log holds no ticks or they are not what this version records.
     """
@@ -88,6 +89,8 @@ def replay_decisions(log: FlightLog, step: Step) -> Comparison:
     recorded = {entry.stamp_ns: entry.message for entry in log.entries if entry.topic == Topic.DECISION}
     if not ticks:
         raise InputError("holds no ticks to replay: an older version recorded it", file=log.path)
+    if log.is_cut and len(ticks) > 1 and ticks[-1].stamp_ns not in recorded:
+        ticks.pop()
     start_ns = ticks[0].stamp_ns
     found: dict[str, list[_Difference]] = {}
     differing = missing = 0

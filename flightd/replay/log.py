@@ -61,6 +61,11 @@ class FlightLog:
     metadata: dict[str, str] = field(default_factory=dict)
     damage: str = ""
 
+    @property
+    def is_cut(self) -> bool:
+        """It ends early: what wrote it was killed, or the file is not all that it wrote."""
+        return self.damage.endswith(_CUT)
+
     def messages(self, kind: type[MessageT], topic: str | None = None) -> list[MessageT]:
         """Every message of a type (of one topic, if given), in the order of the file."""
         return [

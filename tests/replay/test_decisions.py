@@ -145,6 +145,16 @@ def test_gaps_in_the_record_are_told(beginning: Path) -> None:
     assert not comparison.within(1.0)
 
 
+def test_the_tick_that_a_log_was_cut_off_at_is_no_gap(beginning: Path) -> None:
+    recorded = read_log(beginning)
+    whole = replay_decisions(recorded, _step())
+    assert recorded.entries[-1].topic == Topic.DECISION
+    without_last = replace(recorded, entries=recorded.entries[:-1])
+    assert replay_decisions(without_last, _step()).missing == 1
+    cut = replay_decisions(replace(without_last, damage="cut off before its end"), _step())
+    assert (cut.identical, cut.ticks) == (True, whole.ticks - 1)
+
+
 def test_a_log_without_ticks_is_told(tmp_path: Path) -> None:
     with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
