@@ -9,8 +9,12 @@ from collections.abc import Iterator
 import pytest
 
 from flightd import __version__
+from flightd.app.log_study.finding import Study
 from flightd.app.log_study.ray_cluster import Head, NodeLook, check_node
+from flightd.app.log_study.ray_engine import run_ray
+from flightd.app.log_study.sources import LogSource
 from flightd.core.errors import FlightdError, InputError, UnavailableError
+from tests.rigs.extras import of_extra
 
 _KEY = "--address ray://head:10001"
 
@@ -58,6 +62,16 @@ def test_what_a_node_lacks_is_one_line_with_the_remedy(
 
 def test_a_node_that_has_all_is_let_work() -> None:
     check_node(NodeLook("10.0.0.2", __version__, ""), _KEY, is_log=True)
+
+
+def test_what_keeps_ray_from_beginning_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    of_extra("ray", "ray")
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    monkeypatch.setenv("RAY_TMPDIR", "/dev/null")
+    with pytest.raises(UnavailableError) as refused:
+        next(run_ray([LogSource("a", "/a.mcap")], (Study.REPLAY,), 1))
+    assert str(refused.value).startswith("--engine ray: no Ray can be started here: ")
+    assert "Not a directory" in str(refused.value)
 
 
 @contextlib.contextmanager
