@@ -7,7 +7,7 @@ import io
 from pathlib import Path
 from typing import Any
 
-from flightd.adapters.store.sqlite import SqliteStore
+from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.app.simulation.meant_flight import MeantFlight
 from flightd.app.simulation.simulation import Simulation, truth_of
 from flightd.core.csv_text import inert
@@ -62,7 +62,7 @@ def stock_summary(simulation: Simulation, meant: MeantFlight, flight_time_s: flo
 def _records(folder: Path) -> list[LocationRecord] | None:
     if not (folder / "inventory.db").exists():
         return None
-    with SqliteStore(folder, create=False) as store:
+    with opened_for_reading(folder, untouched=True) as store:
         return store.locations()
 
 

@@ -8,6 +8,7 @@ import json
 import multiprocessing
 import re
 import shutil
+import sqlite3
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -68,6 +69,19 @@ def flights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def of_format_8(folder: Path) -> dict[str, bytes]:
+    """Make the inventory there one of an earlier release's, which would not read it as one of today's; its
+    files."""
+    with contextlib.closing(sqlite3.connect(folder / "inventory.db")) as database:
+        database.execute("DROP TABLE site")
+        database.execute("PRAGMA user_version = 8")
+    return inventory_files(folder)
+
+
+def inventory_files(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.glob("inventory.db*")}
+
+
 def told(sources: list[LogSource], found: Iterator[tuple[int, LogFindings]]) -> str:
     by_number = dict(found)
     assert by_number.keys() == set(range(len(sources)))
@@ -113,12 +127,16 @@ def test_a_flight_of_today_is_seen_decided_and_judged_as_it_was(
     assert log["studies"]["judge"]["figures"]["differing"] == {}
     other = tmp_path / "flight"
     shutil.copytree(recorded_flight, other)
+    with SqliteStore(other):
+        pass
+    before = of_format_8(other)
     summary = json.loads((other / "summary.json").read_text())
     summary["cross_track_rms_m"] += 0.01
     (other / "summary.json").write_text(json.dumps(summary))
     ended = flightd("study", other / "flight.mcap", "--with", "judge")
     assert ended.returncode == 1
     assert "cross_track_rms_m" in ended.stdout
+    assert inventory_files(other) == before
     shutil.copyfile(other / "flight.mcap", other / "another.mcap")
     ended = flightd("study", other / "another.mcap", "--with", "judge", "--json")
     assert json.loads(ended.stdout)["outcomes"]["judge"] == {"nothing": 1}, "it is judged by its own truth"
@@ -137,6 +155,7 @@ def test_a_flights_labels_are_those_of_its_own_run_wherever_its_inventory_is(
                 kept = inventory.keep_evidence(picture_of("PAL-1"))
                 seen = look("A-1", LocationState.READ, code(told), run=run, at_s=day, evidence=kept)
                 inventory.commit(seen)
+    before = of_format_8(tmp_path / "inventory")
     studied = ("study", tmp_path / "flights", "--with", "codes", "--json", "--workers", 1)
     ended = flightd(*studied, "--inventory", tmp_path / "inventory")
     told_of = [log["studies"]["codes"] for log in json.loads(ended.stdout)["logs"]]
@@ -146,6 +165,7 @@ def test_a_flights_labels_are_those_of_its_own_run_wherever_its_inventory_is(
         ("nothing", "the inventory has no confirmed look of its run wednesday"),
     ]
     assert json.loads(flightd(*studied).stdout)["outcomes"]["codes"] == {"nothing": 3}
+    assert inventory_files(tmp_path / "inventory") == before
 
 
 @pytest.mark.parametrize("work", [dies_once, always_dies])

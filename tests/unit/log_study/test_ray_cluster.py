@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +16,7 @@ from flightd.app.log_study.ray_cluster import Head, NodeLook, check_node
 from flightd.app.log_study.ray_engine import run_ray
 from flightd.app.log_study.sources import LogSource
 from flightd.core.errors import FlightdError, InputError, UnavailableError
+from tests.command import Command
 from tests.rigs.extras import of_extra
 
 _KEY = "--address ray://head:10001"
@@ -72,6 +75,16 @@ def test_what_keeps_ray_from_beginning_is_one_line(monkeypatch: pytest.MonkeyPat
         next(run_ray([LogSource("a", "/a.mcap")], (Study.REPLAY,), 1))
     assert str(refused.value).startswith("--engine ray: no Ray can be started here: ")
     assert "Not a directory" in str(refused.value)
+
+
+def test_without_ray_there_is_one_line_with_what_to_do(
+    flightd: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "flight.mcap").touch()
+    monkeypatch.setitem(sys.modules, "ray", None)
+    said = "Ray is not installed; pip install 'flightd[ray]', or take --engine local"
+    ended = flightd("study", tmp_path, "--engine", "ray")
+    assert ended == (2, "", f"flightd: --engine ray: {said}\n")
 
 
 @contextlib.contextmanager
