@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import enum
 import os
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -96,10 +97,12 @@ def study(
     found: dict[int, LogFindings] = {}
     ended: BaseException | None = None
     try:
-        for number, one in _studied(sources, chosen, engine, workers, address):
-            found[number] = one
-            if file is not None:
-                file.append(number, one)
+        # on the output Ray tells of a worker that died, whatever it is asked
+        with contextlib.redirect_stdout(sys.stderr):
+            for number, one in _studied(sources, chosen, engine, workers, address):
+                found[number] = one
+                if file is not None:
+                    file.append(number, one)
     except (FlightdError, KeyboardInterrupt) as err:
         ended = err  # what was found until then was hours of work
     ordered = [found[number] for number in sorted(found)]

@@ -10,7 +10,7 @@ import re
 import shutil
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,7 +23,7 @@ from flightd import __version__
 from flightd.adapters.recorder.archive import FlightArchive
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.app.log_study import ray_cluster
+from flightd.app.log_study import ray_cluster, ray_engine
 from flightd.app.log_study.engines import Work, run_local, study_source
 from flightd.app.log_study.finding import LogFindings, Outcome, Study
 from flightd.app.log_study.ray_engine import run_ray
@@ -289,6 +289,22 @@ def test_of_a_folder_of_many_logs_only_what_belongs_to_one_is_fetched(
             assert len(read) == len(here)
     finally:
         files.rm("/flat", recursive=True)
+
+
+def test_what_ray_prints_meanwhile_stays_out_of_the_document(
+    flightd: Command, flights: Path, alone: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def told_by_ray(
+        sources: Sequence[LogSource], studies: tuple[Study, ...], workers: int | None, *, address: str
+    ) -> Iterator[tuple[int, LogFindings]]:
+        for number, one in run_local(sources, studies, 1):
+            print("(raylet) A worker died or was killed")
+            yield number, one
+
+    monkeypatch.setattr(ray_engine, "run_ray", told_by_ray)
+    done = flightd("study", str(flights), "--with", ",".join(STUDIES), "--engine", "ray", "--json")
+    assert json.loads(done.stdout)["logs"] == [json.loads(line) for line in alone.splitlines()]
+    assert done.stderr.count("(raylet)") == 4
 
 
 @pytest.mark.parametrize(
