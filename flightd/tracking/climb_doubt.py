@@ -13,6 +13,8 @@ from collections import deque
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from flightd.tracking.width_heights import LEAP, LEAP_PER_S
+
 _WINDOW_NS = 2_000_000_000
 _OFF_M, _NOTICED_M = 0.35, 0.15
 """What both heights changed by more, or less, than what was told within the window: barometers err by less.
@@ -21,6 +23,8 @@ _AGREEING_M, _AGREEING_SHARE = 0.12, 0.25
 """So far the changes of the two heights may differ: one of them is scaled, the other one noisy."""
 _ALONE_NS, _GAP_NS = 400_000_000, 150_000_000
 """So long lines have to be seen to tell anything alone, in frames no further apart."""
+_ALONE_M = 1.75
+"""From so high on what they contradict alone counts for less: a width is noisy by a share of the height."""
 _RATE_NS, _HELD_NS = 300_000_000, 500_000_000
 """The error of the rate is that of the newest samples that span so long, and holds for so long without."""
 
@@ -61,6 +65,8 @@ class ClimbDoubt:
             self._noticed = self.found
             return
         off_m = _most_off_m(new, samples)
+        if alone:
+            off_m *= min(_ALONE_M / width_m, 1.0)
         self.found = self.found or off_m > _OFF_M
         self._noticed = self.found or off_m > _NOTICED_M
         samples.append(new)
@@ -72,11 +78,10 @@ class ClimbDoubt:
 
     def _goes_on(self, new: _Sample) -> bool:
         last = self._last
-        return (
-            last is not None
-            and new.stamp_ns - last.stamp_ns <= _GAP_NS
-            and abs(new.width_m - last.width_m) < _AGREEING_M
-        )
+        if last is None or new.stamp_ns - last.stamp_ns > _GAP_NS:
+            return False
+        leap = LEAP + LEAP_PER_S * (new.stamp_ns - last.stamp_ns) * 1e-9
+        return abs(new.width_m / last.width_m - 1.0) < leap
 
     def error_mps(self, now_ns: int) -> float:
         """How much too great the told rate is; 0 where nothing is noticed, and while the heights do not agree

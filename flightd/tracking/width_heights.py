@@ -13,7 +13,7 @@ _AGREEING, _DOUBTED = 0.15, 0.2
 _STEADY, _STEADY_PER_S = 0.03, 0.9
 """Lines whose widths tell heights that change by more from frame to frame (share, and share a second between
 them) are none of the map; a fast climb changes them by less."""
-_LEAP, _LEAP_PER_S = 0.04, 1.8
+LEAP, LEAP_PER_S = 0.04, 1.8
 """A height by widths that leaps by more from one frame to the next is another line's."""
 _STEADY_S, _STEADY_SHARE = 0.95, 0.08
 """Widths that never agreed with the height are held against it, too, once they were so long the same share
@@ -70,7 +70,7 @@ class WidthHeights:
         dt_s = min((stamp_ns - self._stamp_ns) * 1e-9, _LONGEST_S)
         gain = _gain(dt_s)
         self._stamp_ns = stamp_ns
-        goes_on = change < _LEAP + _LEAP_PER_S * dt_s
+        goes_on = change < LEAP + LEAP_PER_S * dt_s
         if agrees or (self._judged and goes_on):
             if not self._judged:
                 self._judged, self._share = True, 1.0

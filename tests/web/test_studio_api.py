@@ -15,11 +15,13 @@ import pytest
 from flightd.core.errors import InputError, RunError
 from flightd.ground.access.roles import Role
 from flightd.ground.flights.flights import Flights
+from flightd.ground.reading_process import ReadingProcess
 from flightd.ground.studio import studio as studio_module
-from flightd.ground.studio.lessons import Outcome
+from flightd.ground.studio.lessons import Outcome, get_ready
 from flightd.ground.studio.picture_sets import PictureSets
 from flightd.ground.studio.studio import Studio, missing_training
 from flightd.ground.studio.verdict import Judged, Verdict
+from flightd.runtime.within import Within
 from flightd.studies.train import train_colour
 from flightd.vision.lines.colour_profile import classify, grow, load_profile, save_profile
 from flightd.vision.lines.sampling import grid_for, sample
@@ -182,6 +184,26 @@ class Hasty(Studio):
 
             setattr(self.disk, "run", replaced)  # noqa: B010 - a method, for once
         return outcome
+
+
+@in_real_time
+async def test_who_looks_round_has_the_code_read_that_looks_at_pictures(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = asyncio.Event()
+    run = ReadingProcess.run
+
+    async def watched(self: ReadingProcess, function: Any, *args: Any) -> Any:
+        answer = await run(self, function, *args)
+        if function is get_ready:
+            done.set()
+        return answer
+
+    monkeypatch.setattr(ReadingProcess, "run", watched)
+    async with served(folder=folder) as station:
+        await got(station, "/api/studio")
+        async with Within(120.0):
+            await done.wait()
 
 
 @in_real_time

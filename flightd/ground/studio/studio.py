@@ -75,31 +75,36 @@ class Studio:
         self.disk = Threads(2, 32, "too much waits for the disk already")
         self._orders: asyncio.Queue[tuple[str, tuple[str, ...]]] = asyncio.Queue(1)
         self._trainings: dict[str, Training] = {}
-        self._readied: asyncio.Task[None] | None = None
+        self._is_looked_at = asyncio.Event()
 
     async def run(self) -> None:
         try:
-            while True:
-                name, flights = await self._orders.get()
-                try:
-                    await self._train(name, flights)
-                    self._trainings.pop(name, None)
-                except (FlightdError, OSError) as err:
-                    self._trainings[name] = Training(name, running=False, refused=str(err))
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self._get_ready())
+                tasks.create_task(self._train_as_ordered())
         finally:
-            if self._readied is not None:
-                self._readied.cancel()
             self._looking.close()
             self._learning.close()
 
     def get_ready(self) -> None:
-        """Begin to read the code that looks at pictures, which takes seconds: somebody is about to ask it."""
-        if self._readied is None:
-            self._readied = asyncio.create_task(self._read_code())
+        """Somebody is about to ask: have the code read that looks at pictures, which takes seconds."""
+        self._is_looked_at.set()
 
-    async def _read_code(self) -> None:
-        with contextlib.suppress(FlightdError):  # whoever asks next is told of it
-            await self._looking.run(get_ready, _WITHIN_S)
+    async def _get_ready(self) -> None:
+        while True:
+            await self._is_looked_at.wait()
+            self._is_looked_at.clear()
+            with contextlib.suppress(FlightdError):  # whoever asks is told of it
+                await self._looking.run(get_ready, _WITHIN_S)
+
+    async def _train_as_ordered(self) -> None:
+        while True:
+            name, flights = await self._orders.get()
+            try:
+                await self._train(name, flights)
+                self._trainings.pop(name, None)
+            except (FlightdError, OSError) as err:
+                self._trainings[name] = Training(name, running=False, refused=str(err))
 
     def training_of(self, name: str) -> Training | None:
         return self._trainings.get(name)

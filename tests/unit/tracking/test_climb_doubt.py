@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
 
 import pytest
@@ -72,6 +73,20 @@ def test_what_looks_like_a_line_in_a_few_frames_contradicts_nothing() -> None:
     assert not alone(lambda _: 1.2, lambda s: math.fmod(s, 0.3) < 0.1).found, "it comes and goes"
     seam, line = (lambda s: 1.2 if s < 2.0 else 1.6), (lambda s: 1.9 < s < 1.97 or s > 2.2)
     assert not alone(seam, line).found, "the line is not held against the seam"
+
+
+@pytest.mark.parametrize("height_m", [1.6, 2.5, 3.5])
+@pytest.mark.parametrize("seed", range(4))
+def test_widths_that_are_noisy_high_up_tell_a_climb_alone_and_none_where_there_is_none(
+    height_m: float, seed: int
+) -> None:
+    for climb_mps, is_found in ((0.0, False), (1.0, True)):
+        noise, doubt = random.Random(seed), ClimbDoubt()
+        for frame in range(round(2.5e9 / _FRAME_NS)):
+            at_s = frame * _FRAME_NS * 1e-9
+            width_m = (height_m + climb_mps * max(at_s - 1.0, 0.0)) * (1.0 + noise.gauss(0.0, 0.02))
+            doubt.step(1 + frame * _FRAME_NS, width_m, width_m, 0.0, alone=True)
+        assert doubt.found is is_found
 
 
 def test_what_is_wrong_once_is_not_put_right_by_heights_that_do_not_agree_or_are_old() -> None:
