@@ -14,7 +14,7 @@ _VALUE_SPAN_MS: Final = 3_600_000
 """A class of value outweighs the way to it up to so long."""
 _MOST_OF_TOUR: Final = 40
 """A drone is not given more nodes at a time."""
-HOURS_UNKNOWN: Final = "it is not known yet whether its schedule lets it begin"
+HOURS_UNKNOWN: Final = "the schedule is read anew"
 
 
 class Value(IntEnum):

@@ -259,7 +259,7 @@ export default {
   "the schedule was suspended": "Zeitplan ausgesetzt",
   "the drone is not heard": "die Drohne wird nicht gehört",
   "these are quiet hours": "jetzt ist Ruhezeit",
-  "it is not known yet whether its schedule lets it begin": "noch ist nicht bekannt, ob der Zeitplan es beginnen lässt",
+  "the schedule is read anew": "Zeitplan wird neu gelesen",
   "the station was off, or its clock jumped": "die Station war aus, oder ihre Uhr sprang",
   "all of a site is counted by the ground store, and there is none": "eine ganze Halle wird nach dem Bodenspeicher gezählt, und es gibt keinen",
   "give --store FILE": "geben Sie --store FILE",
