@@ -1,5 +1,5 @@
-// What people closed to the drones, who may still be in it, and
-// closing and opening.  What is opened takes a second press: people may be in there.
+// What people closed to the drones, who may still be in it, and closing and opening.  What is opened takes a
+// second press: people may be in there.
 import { mayOperate } from "../access/session.js";
 import { html, useEffect, useState } from "../html.js";
 import { quoted, say } from "../language.js";
