@@ -321,12 +321,14 @@ class OwnFleet(VehicleSides):
         UnavailableError where the fleet does not fly yet."""
         if drone and drone not in self._drones:
             raise InputError(f"no drone of the fleet is called {drone}")
-        self._asked_traffic().ask(nodes, drone)
+        self._flying().ask(nodes, drone)
+        self._let_leave()
 
     def ask_by_value(self, worth: Mapping[str, Worth], asked: ByValue) -> tuple[str, ...]:
         """Have the most valuable visited; which.  UnavailableError where the fleet does not fly yet."""
         chosen = self.valued(worth, asked)
-        self._asked_traffic().ask_worth({node: worth.get(node, UNKNOWN) for node in chosen})
+        self._flying().ask_worth({node: worth.get(node, UNKNOWN) for node in chosen})
+        self._let_leave()
         return chosen
 
     # what schedules ask of it
@@ -365,11 +367,12 @@ class OwnFleet(VehicleSides):
         """Have the nodes of a schedule's run visited, once, and these levels counted there (none: all);
         `knows_run` says when that is written down.  Until `until_s` (UTC) it outlives a station that ends.
         InputError for a node that is not there, UnavailableError where the fleet does not fly."""
-        traffic = self._asked_traffic()
+        traffic = self._flying()
         if not self.has_run(run):
             traffic.ask_worth(worth, levels=levels, run=run)
             self._runs = dict([*self._runs.items(), (run, until_s)][-_MOST_RUNS:])
             self._queue.runs = {**self._queue.runs, run: ""}
+        self._let_leave()
 
     @property
     def runs_left(self) -> frozenset[str]:
@@ -405,14 +408,13 @@ class OwnFleet(VehicleSides):
         done = {*self._queue.done}
         return tuple(node for node in nodes if node not in done)
 
-    def _asked_traffic(self) -> StationTraffic:
-        """Of which a person asks something: drones may leave the ground for it, and begin nothing of a run
-        whose hours are not told again."""
-        traffic, untold = self._flying(), self._untold_runs
+    def _let_leave(self) -> None:
+        """Once something was asked that is not refused: drones may leave the ground, and begin nothing of a
+        run whose hours are not told again."""
+        untold = self._untold_runs
         self._queue.runs = {run: why for run, why in self._queue.runs.items() if run not in untold}
         self._may_leave, self._untold_runs = True, frozenset()
         self._let_start()
-        return traffic
 
     def _let_start(self) -> None:
         for each in self._fleet[1].values() if self._fleet is not None else ():

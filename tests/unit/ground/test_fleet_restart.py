@@ -5,14 +5,17 @@ from __future__ import annotations
 import asyncio
 import random
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from flightd.core.errors import UnavailableError
+from flightd.core.errors import InputError, UnavailableError
 from flightd.core.types import CommandKind, Phase
+from flightd.fleet.traffic.valued_work import UNKNOWN
 from flightd.ground.fleet.fleet_memory import FILE, TOO_OLD, FleetMemory
+from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.messages import Act
 from flightd.ground.own_database import OwnDatabase
 from tests.rigs.paper_drones import hall
@@ -35,6 +38,15 @@ async def until_done(fleet: PaperFleet, nodes: str) -> None:
         if fleet.state["open"] and all(drone.phase is Phase.PREFLIGHT for drone in fleet.drones.values()):
             fleet.own.ask(fleet.state["open"])
     pytest.fail(f"done are {fleet.state['done']}")
+
+
+async def die_with_work(fleet: PaperFleet) -> None:
+    """The station was asked for A3, for which no drone starts."""
+    for drone in fleet.drones.values():
+        drone.never_starts = True
+    fleet.own.ask(["A3"])
+    await asyncio.sleep(5.0)
+    await fleet.kill()
 
 
 def at_rest(fleet: PaperFleet) -> bool:
@@ -192,11 +204,7 @@ def test_a_station_that_dies_before_it_hears_anybody_leaves_what_is_known(
 
 def test_nobody_leaves_the_ground_for_what_a_station_before_was_asked_for(tmp_path: Path) -> None:
     async def go(fleet: PaperFleet) -> None:
-        for drone in fleet.drones.values():
-            drone.never_starts = True
-        fleet.own.ask(["A3"])
-        await asyncio.sleep(5.0)
-        await fleet.kill()
+        await die_with_work(fleet)
         for drone in fleet.drones.values():
             drone.never_starts = False
         fleet.start_again()
@@ -209,13 +217,28 @@ def test_nobody_leaves_the_ground_for_what_a_station_before_was_asked_for(tmp_pa
     fly(go, memory=FleetMemory(tmp_path))
 
 
+@pytest.mark.parametrize(
+    "ask", [lambda own: own.ask(["B3", "A9"]), lambda own: own.take_run("run-1", {"A9": UNKNOWN})]
+)
+def test_nor_for_a_request_that_is_refused(tmp_path: Path, ask: Callable[[OwnFleet], None]) -> None:
+    async def go(fleet: PaperFleet) -> None:
+        await die_with_work(fleet)
+        for drone in fleet.drones.values():
+            drone.never_starts = False
+        fleet.start_again()
+        await until(lambda: fleet.state["flies"])
+        with pytest.raises(InputError, match="no node is called A9"):
+            ask(fleet.own)
+        await asyncio.sleep(30.0)
+        assert fleet.state["open"] == ["A3"]
+        assert {drone.phase for drone in fleet.drones.values()} == {Phase.PREFLIGHT}
+
+    fly(go, memory=FleetMemory(tmp_path))
+
+
 def test_nor_once_the_drones_have_another_map(tmp_path: Path) -> None:
     async def go(fleet: PaperFleet) -> None:
-        for drone in fleet.drones.values():
-            drone.never_starts = True
-        fleet.own.ask(["A3"])
-        await asyncio.sleep(5.0)
-        await fleet.kill()
+        await die_with_work(fleet)
         fleet.start_again()
         await until(lambda: fleet.state["flies"])
         await until(lambda: all(fleet.flown(name) for name in fleet.drones))
