@@ -256,23 +256,31 @@ class DockQueue:
                     self.waited_ms += now_ms - self._since_ms.pop(drone)
 
     def _fly_to(self, drone: str, dock: Dock, left_ms: int, now_ms: int) -> bool:
-        """To a dock, if its battery lasts for that with all that it has to wait for; home otherwise."""
+        """To a dock, if its battery lasts for that with all that it has to wait for; home otherwise.  Whether
+        it flies to the dock: also where it does not come home."""
         if not self._give(drone, (), dock, now_ms):
             return False
         way_ms = self._control.drones[drone].ahead[-1].end_ms - now_ms
         if way_ms + self._back_ms(drone, dock) <= left_ms:
             return True
-        self._go_home(drone, now_ms)
-        return False
+        return not self._go_home(drone, now_ms)
 
     def _make_room(self, holder: str, dock: Dock, known: dict[str, Standing], now_ms: int) -> None:
         """Who is charged, and has nothing to do, goes home for whoever waits."""
         course = self._control.drones[holder]
         standing = known.get(holder)
-        may_go = standing is not None and standing.may_start and standing.charge >= self._full_enough
-        if may_go and not course.ahead and course.place == dock.place and not self._is_early(holder, now_ms):
+        is_charged = standing is not None and standing.charge >= self._full_enough
+        rests = not course.ahead and course.place == dock.place
+        if standing is None or not (is_charged and rests) or self._is_early(holder, now_ms):
+            return
+        if self._may_leave(holder, standing):
             self._next_try_ms[holder] = now_ms + _RETRY_MS
             self._go_home(holder, now_ms)
+
+    def _may_leave(self, holder: str, standing: Standing) -> bool:
+        """Whether it may be sent home, and a way there is open."""
+        place, home = self._control.drones[holder].place, self.home(holder)
+        return standing.may_start and self._open_ways.ms(holder, place, (home,)) < NEVER
 
     def _free_in_ms(self, name: str, known: dict[str, Standing]) -> int:
         holder = self._holder.get(name)
@@ -281,7 +289,8 @@ class DockQueue:
         dock, course = self._docks[name], self._control.drones[holder]
         standing = known.get(holder)
         charge = 0.0 if standing is None else standing.charge
-        if standing is not None and not standing.may_start and charge >= self._full_enough:
+        is_charged = charge >= self._full_enough
+        if standing is not None and is_charged and not self._may_leave(holder, standing):
             charge = 0.0  # it stays for nobody knows how long
         return self._distances.to(dock.place)[course.place] + dock.service_ms(charge) + _LEAVES_MS
 
@@ -296,8 +305,8 @@ class DockQueue:
         self._control.drones[drone].ends = (dock.place, home)
         return True
 
-    def _go_home(self, drone: str, now_ms: int) -> None:
-        self._control.give(drone, (), (self.home(drone),), now_ms)
+    def _go_home(self, drone: str, now_ms: int) -> bool:
+        return self._control.give(drone, (), (self.home(drone),), now_ms)
 
     def _back_ms(self, drone: str, dock: Dock) -> int:
         """From a dock to the drone's own pad, where it has to come there."""

@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+import pytest
+
 from flightd.fleet.traffic.closures import Closure
 from flightd.fleet.traffic.dispatcher import Dispatcher, DroneReport
+from flightd.fleet.traffic.distances import Distances
+from flightd.fleet.traffic.dock_queue import DockQueue, Standing
 from flightd.fleet.traffic.docks import Dock, DockKind
 from flightd.fleet.traffic.endurance import Endurance
+from flightd.fleet.traffic.open_ways import OpenWays
 from flightd.fleet.traffic.traffic_control import TrafficControl
 from flightd.fleet.traffic.work_queue import NodeWork, WorkQueue
 from tests.unit.fleet.test_traffic_control import Floor
@@ -29,9 +34,9 @@ def charge_for(left_s: float) -> float:
 class Steps:
     """A dispatcher a second at a time, by drones that do an action in each, or `wait`."""
 
-    def __init__(self, dispatcher: Dispatcher, grounded: str = "") -> None:
+    def __init__(self, dispatcher: Dispatcher) -> None:
         self.dispatcher = dispatcher
-        self.grounded = grounded
+        self.grounded = ""
         """Nobody may send this one anywhere."""
         self.now_ms = 0
 
@@ -83,7 +88,10 @@ def test_who_waits_too_long_on_its_way_to_a_dock_goes_home_instead() -> None:
     assert control.drones["d0"].place == home
 
 
-def test_a_dock_that_who_is_charged_may_not_leave_is_not_waited_for_while_another_one_is_free() -> None:
+@pytest.mark.parametrize("cut_off", [False, True])
+def test_a_dock_that_who_is_charged_does_not_leave_is_not_waited_for_while_another_one_is_free(
+    cut_off: bool,
+) -> None:
     hall = SmallHall(3, 6, 4)
     pads = {hall.lanes.vertices[pad].node: pad for pad in hall.lanes.pads}
     control = TrafficControl(hall.lanes, replace(PACE, speed_mps=0.2), CELL)
@@ -91,11 +99,32 @@ def test_a_dock_that_who_is_charged_may_not_leave_is_not_waited_for_while_anothe
     control.enter("d1", pads["DAB10"])
     docks = [Dock(node, pads[node], DockKind.CONTACT, 1800.0) for node in ("DAA10", "DAB1")]
     queue = work("A6")
-    steps = Steps(Dispatcher(control, queue, Endurance(FULL_S), docks=docks, keep_home=True), grounded="d0")
+    steps = Steps(Dispatcher(control, queue, Endurance(FULL_S), docks=docks, keep_home=True))
+    if cut_off:
+        steps.dispatcher.close([Closure("spur", (("DAA1", "DAA2"),), "the spur is closed")], 0)
+    else:
+        steps.grounded = "d0"
     while not queue.done:
         steps.go({"d0": 1.0, "d1": 1.0})
     steps.all(20, {"d0": 1.0, "d1": 0.85}, wait=True)
     assert steps.dispatcher.docks.holders == {"DAA10": "d0", "DAB1": "d1"}
+
+
+def test_who_is_cut_off_from_home_has_the_dock_that_it_flies_to_however_long_it_waits_on_its_way() -> None:
+    hall = SmallHall(3, 6, 4)
+    pads = {hall.lanes.vertices[pad].node: pad for pad in hall.lanes.pads}
+    control = TrafficControl(hall.lanes, PACE, CELL)
+    control.enter("d0", hall.lanes.over("A5"), ends=(pads["DAA1"],))
+    control.enter("d1", hall.lanes.over("A3"), ends=(pads["DAB1"],))
+    for name, way in (("spur", ("DAA1", "DAA2")), ("aisle", ("A6", "A7"))):
+        control.close(name, hall.lanes.lanes_between([way]), 0)
+    assert control.give("d1", [hall.stop("A3", 600_000)], (pads["DAB1"],), 0)
+    dock = Dock("D", pads["DAA10"], DockKind.CONTACT, 1800.0)
+    ways = Distances(control.net), OpenWays(control)
+    queue = DockQueue(control, *ways, [dock], 0.9, returns=True)
+    queue.step(1000, {"d0": Standing(0.3, None)}, {"d0": 300_000})
+    assert control.drones["d0"].ahead[-1].vertex == dock.place, "nowhere else is better"
+    assert queue.holders == {"D": "d0"}
 
 
 def test_what_no_battery_lasts_for_is_told_once_all_were_ready_and_tried_with_a_fuller_one() -> None:
