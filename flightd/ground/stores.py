@@ -12,7 +12,7 @@ from typing import TypeAlias
 from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.adapters.store.unavailable import InventoryUnavailableError
-from flightd.core.errors import FlightdError, InputError, UnavailableError
+from flightd.core.errors import FlightdError, InputError
 from flightd.core.inventory import LocationRecord, Observation, Standing
 from flightd.core.topics import Document, Topic
 from flightd.ground.plain_files import is_plain_file, is_plain_folder, plain_file
@@ -170,12 +170,8 @@ def _map_of(log: Path) -> Site | None:
 
 def _kept_site_name(folder: Path) -> str:
     try:
-        try:
-            with SqliteStore(folder, read_only=True) as store:
-                return store.site
-        except UnavailableError:  # its writer was cut off
-            with opened_for_reading(folder, untouched=True) as store:
-                return store.site
+        with opened_for_reading(folder, untouched=True) as store:
+            return store.site
     except OSError as err:
         raise InventoryUnavailableError(f"cannot be read: {err.strerror or err}", file=folder) from None
 

@@ -1,8 +1,8 @@
-"""A store for who only looks: as it is where he may write, through a copy where he may not.
+"""A store for who only looks: as it is where that can be, through a copy where it cannot.
 
 SQLite's write-ahead log wants files beside the database, and a log that a power cut left must be taken up
 before the database says the truth; on a read-only medium, or in a folder of another user, neither can be.
-A copy of a few megabytes can do both.
+A copy can do both; it costs as much room and writing as the database is large.
 """
 
 from __future__ import annotations
@@ -30,13 +30,30 @@ _NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 def opened_for_reading(folder: Path, *, untouched: bool = False) -> Iterator[SqliteStore]:
     """The store in `folder`, to look at; nothing that is written to it need stay.
 
-    `untouched`: through a copy wherever it lies, so that nothing in the folder changes, its writer's log
+    `untouched`: for one question, wherever it lies, and nothing in the folder changes, its writer's log
     neither, while a flight counts into it or after one was cut off.  Raises what `SqliteStore` raises, and
-    InventoryUnavailableError for one that changes too fast to be copied, or for which there is no room."""
-    if not (folder / _DATABASE).exists() or (not untouched and _is_writable(folder)):
-        with SqliteStore(folder, create=False) as store:
-            yield store
-        return
+    as `copied_for_reading` where only a writer can read it."""
+    with _uncopied(folder, untouched) or copied_for_reading(folder) as store:
+        yield store
+
+
+def _uncopied(folder: Path, untouched: bool) -> SqliteStore | None:
+    """None where it takes a copy."""
+    if untouched:
+        try:
+            return SqliteStore(folder, read_only=True)
+        except InventoryUnavailableError:
+            return None
+    if not (folder / _DATABASE).exists() or _is_writable(folder):
+        return SqliteStore(folder, create=False)
+    return None
+
+
+@contextmanager
+def copied_for_reading(folder: Path) -> Iterator[SqliteStore]:
+    """A copy of the store in `folder` as it is now, with the pictures that are there: for who reads long,
+    while others write it.  Raises what `SqliteStore` raises, and InventoryUnavailableError for one that
+    changes too fast to be copied, or for which there is no room."""
     with TemporaryDirectory(prefix="flightd-inventory-") as beside:
         copy = Path(beside)
         _copied(folder, copy)

@@ -61,7 +61,8 @@ class SqliteStore:
         """Open the store, making it when `create`.  Raises InputError for what is no inventory (or is
         missing), InventoryUnavailableError when the disk refuses.
 
-        `read_only` never makes one and leaves no trace of its own beside it, whoever writes it meanwhile."""
+        `read_only` never makes one and leaves no trace of its own beside it, whoever writes it meanwhile;
+        InventoryUnavailableError, too, for one that a writer has to open first."""
         self.folder = folder
         create = create and not read_only
         self._file = folder / "inventory.db"
@@ -98,8 +99,9 @@ class SqliteStore:
             if version not in READABLE:
                 older = version in TAKEN_OVER
                 remedy = f"flightd inventory show {self.folder}" if older else "the flightd that wrote it"
-                problem = f"format {version}, known here is {VERSION}"
-                raise InputError(f"{self._file}: {problem}", remedy=f"open it once with {remedy}")
+                kind = InventoryUnavailableError if older else InputError
+                problem = f"{self._file}: format {version}, known here is {VERSION}"
+                raise kind(problem, remedy=f"open it once with {remedy}")
 
     def _marks(self) -> tuple[int, int]:
         """The format's version and the application id."""

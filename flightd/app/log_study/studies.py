@@ -85,9 +85,7 @@ def _codes(path: Path, folder: Path) -> Finding:
     if folder == path.parent and not (folder / "inventory.db").exists():
         return Finding(Outcome.NOTHING, "no inventory beside it; say where it is: --inventory FOLDER")
     run = skim(path).metadata.get("run", "")
-    with opened_for_reading(
-        folder, untouched=True
-    ) as inventory:  # the release that is judged takes none over
+    with opened_for_reading(folder, untouched=True) as inventory:  # a release on trial takes none over
         found = inventory.looks_of_run(run) if run else inventory.looks()  # an old log does not say its run
         looks = [seen for seen, standing in found if standing is Standing.CONFIRMED]
         evidence = inventory.evidence

@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 
 import msgspec
 
-from flightd.adapters.store.for_reading import opened_for_reading
+from flightd.adapters.store.for_reading import copied_for_reading
 from flightd.adapters.store.kept_looks import KeptLook
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError
@@ -107,7 +107,7 @@ def deliver_inventory(folder: Path, site: str, source: str, target: Target, done
             remedy="deliver it with --site NAME, or FLIGHTD_SITE",
         )
     target.standings(())  # nothing is copied, every ten minutes, for one that is away
-    with opened_for_reading(folder, untouched=True) as inventory:
+    with copied_for_reading(folder) as inventory:
         planned_ns = inventory.newest_ns()
         for places in _parts(inventory.planned()):
             target.take(Batch(site, source, places=tuple(places), planned_ns=planned_ns))

@@ -6,13 +6,14 @@ import json
 import resource
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 
 import pytest
 from typer.testing import CliRunner, Result
 
-from flightd.adapters.store.for_reading import opened_for_reading
+from flightd.adapters.store.for_reading import copied_for_reading, opened_for_reading
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.adapters.store.unavailable import InventoryUnavailableError
 from flightd.cli.main import app
@@ -49,6 +50,36 @@ def frozen(folder: Path) -> Path:
     return folder
 
 
+def cut_off(store: Path) -> Path:
+    """The store beside it as a power cut leaves it, with a look in its log alone."""
+    cut = store.with_name("cut")
+    with SqliteStore(store) as writer:
+        writer.commit(Observation("r", "A-02", 2, LocationState.OCCLUDED, 0.0))
+        shutil.copytree(store, cut)
+    (cut / "inventory.db-shm").unlink()
+    return cut
+
+
+@contextmanager
+def no_room() -> Iterator[None]:
+    """Meanwhile no file may be written that is as large as an inventory."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def content(store: Path) -> dict[str, bytes]:
+    """The database and its log; the index beside them is that of all who read in its writer's process."""
+    return {path.name: path.read_bytes() for path in store.glob("inventory.db*") if path.suffix != ".db-shm"}
+
+
+def states(store: SqliteStore) -> list[LocationState]:
+    return [record.state for record in store.locations()]
+
+
 def test_a_store_without_write_permission_is_shown_exported_and_compared(store: Path, folder: Path) -> None:
     before = sorted(path.name for path in store.iterdir())
     books = folder / "books.csv"
@@ -66,13 +97,8 @@ def test_a_store_without_write_permission_is_shown_exported_and_compared(store: 
     assert sorted(path.name for path in store.iterdir()) == before
 
 
-def test_what_a_power_cut_left_in_the_log_is_read_too(store: Path, folder: Path) -> None:
-    cut = folder / "cut"
-    with SqliteStore(store) as writer:
-        writer.commit(Observation("r", "A-02", 2, LocationState.OCCLUDED, 0.0))
-        shutil.copytree(store, cut)
-    (cut / "inventory.db-shm").unlink()
-    frozen(cut)
+def test_what_a_power_cut_left_in_the_log_is_read_too(store: Path) -> None:
+    cut = frozen(cut_off(store))
     run("show", store)
     with as_somebody_else():
         shown = run("show", cut, "--json")
@@ -99,14 +125,39 @@ def test_what_is_wrong_is_said_of_the_store_and_not_of_a_copy(store: Path) -> No
     assert f"{store / 'inventory.db'}: no inventory, or a damaged one" in str(shown.exception)
 
 
+def test_one_that_is_to_stay_as_it_is_takes_no_room_where_it_can_be_read_so(store: Path) -> None:
+    with no_room(), opened_for_reading(store, untouched=True) as opened:
+        assert states(opened) == [LocationState.EMPTY, LocationState.NOT_VISITED]
+    with SqliteStore(store) as writer:
+        writer.commit(Observation("r", "A-02", 2, LocationState.OCCLUDED, 0.0))
+        before = content(store)
+        with no_room(), opened_for_reading(store, untouched=True) as opened:
+            assert states(opened) == [LocationState.EMPTY, LocationState.OCCLUDED]
+        assert content(store) == before
+
+
+def test_one_that_is_to_stay_as_it_is_is_copied_where_only_a_writer_can_read_it(store: Path) -> None:
+    cut = cut_off(store)
+    before = content(cut)
+    with opened_for_reading(cut, untouched=True) as opened:
+        assert states(opened) == [LocationState.EMPTY, LocationState.OCCLUDED]
+    assert content(cut) == before
+
+
+def test_a_copy_stays_as_it_was_while_others_write_the_store(store: Path) -> None:
+    with SqliteStore(store) as writer, copied_for_reading(store) as copy:
+        writer.commit(Observation("r", "A-02", 2, LocationState.OCCLUDED, 0.0))
+        assert states(copy) == [LocationState.EMPTY, LocationState.NOT_VISITED]
+
+
 def test_that_there_is_no_room_for_the_copy_is_told_as_that(store: Path) -> None:
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
-    try:
-        with pytest.raises(InventoryUnavailableError) as caught, opened_for_reading(store, untouched=True):
-            pytest.fail("there is room")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    cut = cut_off(store)
+    with (
+        no_room(),
+        pytest.raises(InventoryUnavailableError) as caught,
+        opened_for_reading(cut, untouched=True),
+    ):
+        pytest.fail("there is room")
     told = str(caught.value)
-    assert told.startswith(f"{store}/inventory.db: no room for a copy in {gettempdir()}: ")
+    assert told.startswith(f"{cut}/inventory.db: no room for a copy in {gettempdir()}: ")
     assert told.endswith("; make room, or name another folder: TMPDIR=DIR")

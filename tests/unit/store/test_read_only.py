@@ -110,7 +110,7 @@ def test_what_is_no_store_of_today_is_refused_and_not_made_one(tmp_path: Path) -
     with sqlite3.connect(file) as changed:
         changed.execute("PRAGMA user_version = 1")
     changed.close()
-    with pytest.raises(InputError, match="format 1, known here is 9; open it once with flightd inventory"):
+    with pytest.raises(UnavailableError, match="format 1, known here is 9; open it once with flightd inven"):
         SqliteStore(tmp_path, read_only=True)
     with sqlite3.connect(file) as changed:
         changed.execute("PRAGMA application_id = 7")

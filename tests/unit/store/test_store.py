@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 
 from flightd.adapters.store import evidence_pictures
 from flightd.adapters.store.evidence_pictures import EvidenceFolder
+from flightd.adapters.store.for_reading import opened_for_reading
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.inventory import (
@@ -420,6 +421,10 @@ def test_an_inventory_of_an_earlier_format_is_taken_over_as_confirmed(tmp_path: 
         database.execute(statement)
     database.execute(f"PRAGMA user_version = {version}")
     database.close()
+    before = (tmp_path / "inventory.db").read_bytes()
+    with opened_for_reading(tmp_path, untouched=True) as store:
+        assert newest(store, look(1).location) == look(1).id
+    assert (tmp_path / "inventory.db").read_bytes() == before
     unsure = replace(look(2), undecided=UNDECIDED)
     with SqliteStore(tmp_path) as store:
         assert newest(store, look(1).location) == look(1).id
