@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import stat
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -25,6 +27,7 @@ _BESIDE: Final[Mapping[Study, Sequence[str]]] = MappingProxyType(
     {Study.CODES: _INVENTORY, Study.JUDGE: ("truth.mcap", "summary.json", *_INVENTORY)}
 )
 """What lies beside a log and is read; the others read the log alone."""
+_NOT_THERE: Final = {errno.ENOENT, errno.ENOTDIR, errno.ELOOP}
 _PICTURES: Final = "evidence"
 """The inventory's, in folders of their own, for `Study.CODES`."""
 
@@ -79,9 +82,10 @@ def log_sources(places: Sequence[str]) -> list[LogSource]:
 def _local(path: Path) -> list[LogSource]:
     """InputError for a folder that cannot be looked through: flights would be missing without a word."""
     try:
-        if not path.is_file() and not path.is_dir():
+        kind = _kind(path)
+        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
             raise InputError("is neither a log nor a folder", file=path)
-        logs = [path] if path.is_file() else sorted(_logs_below(path))
+        logs = [path] if stat.S_ISREG(kind) else sorted(_logs_below(path))
         return [LogSource(str(log), str(log.resolve())) for log in logs]
     except OSError as err:
         what = f"cannot be looked through: {err.strerror or err}"
@@ -95,7 +99,18 @@ def _logs_below(folder: Path) -> Iterator[Path]:
 
     for place, _, names in os.walk(folder, onerror=ended):
         logs = (Path(place, name) for name in names if _is_flight(name))
-        yield from (log for log in logs if log.is_file())
+        yield from (log for log in logs if stat.S_ISREG(_kind(log)))
+
+
+def _kind(path: Path) -> int:
+    """The mode of what is there, 0 for nothing.  OSError where that cannot be seen, for which `Path.is_file`
+    says False from Python 3.14 on."""
+    try:
+        return path.stat().st_mode
+    except OSError as err:
+        if err.errno in _NOT_THERE:
+            return 0
+        raise
 
 
 def _remote(url: str) -> Iterator[LogSource]:

@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import json
 import multiprocessing
+import os
 import re
 import shutil
 import sqlite3
@@ -349,6 +350,27 @@ def test_a_folder_that_cannot_be_looked_through_is_named() -> None:
             assert str(refused.value).startswith(f"{named}: cannot be looked through: Permission denied; ")
         assert len(log_sources([str(hall / "a")])) == 1
         closed.chmod(0o700)
+
+
+def test_a_folder_that_can_be_listed_and_not_entered_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "is_file", os.path.isfile)  # as from Python 3.14 on
+    monkeypatch.setattr(Path, "is_dir", os.path.isdir)
+    with TemporaryDirectory() as made:
+        hall, listed = Path(made), Path(made) / "listed"
+        for folder in (hall / "a", listed):
+            folder.mkdir()
+            (folder / "flight.mcap").touch()
+        (hall / "a" / "gone.mcap").symlink_to("nowhere")
+        (hall / "a" / "round.mcap").symlink_to("round.mcap")
+        hall.chmod(0o755)
+        listed.chmod(0o444)
+        for asked in (hall, listed, listed / "flight.mcap"):
+            with pytest.raises(InputError) as refused, as_somebody_else():
+                log_sources([str(asked)])
+            told = f"{listed}/flight.mcap: cannot be looked through: Permission denied; "
+            assert str(refused.value).startswith(told)
+        assert len(log_sources([str(hall / "a")])) == 1
+        listed.chmod(0o700)
 
 
 @pytest.fixture(scope="module")
