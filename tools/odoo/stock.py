@@ -83,15 +83,12 @@ class OdooStock:
 
 def read_stock(odoo: Odoo, asked: OdooSection) -> OdooStock:
     """InputError where Odoo has not the location, or no places below it."""
-    left_out: list[str] = []
     root = _root(odoo, asked)
-    places = _places(odoo, asked, root, left_out)
+    places, others = _places(odoo, asked, root)
     named = {location.id: place for place, location in places.items()}
-    quants = [
-        quant
-        for quant in odoo.records("stock.quant", Quant, _goods_below(root))
-        if quant.location_id[0] in named
-    ]
+    goods = list(odoo.records("stock.quant", Quant, _goods_below(root)))
+    left_out = [_told_of(kind, locations, goods) for kind, locations in others.items() if locations]
+    quants = [quant for quant in goods if quant.location_id[0] in named]
     products = _products(odoo, quants)
     found: dict[tuple[str, str], list[Quant]] = {}
     named_so: dict[str, set[str]] = {}
@@ -156,19 +153,19 @@ def _root(odoo: Odoo, asked: OdooSection) -> int:
     return roots[0].id
 
 
-def _places(odoo: Odoo, asked: OdooSection, root: int, left_out: list[str]) -> dict[str, Location]:
-    """Locations by what a count calls them.  One with others below it is an area, as that of a warehouse,
-    to which Odoo itself gives a barcode."""
+def _places(odoo: Odoo, asked: OdooSection, root: int) -> tuple[dict[str, Location], dict[str, set[int]]]:
+    """Locations by what a count calls them, and those that are no places, by their kind.  One with others
+    below it is an area, as that of a warehouse, to which Odoo itself gives a barcode."""
     below: Domain = [["id", "child_of", root], ["usage", "=", "internal"]]
     found = list(odoo.records("stock.location", Location, below))
     above = {one.location_id[0] for one in found if isinstance(one.location_id, tuple)}
-    areas = [one for one in found if one.id in above]
+    areas = {one.id for one in found if one.id in above}
     places: dict[str, Location] = {}
-    nameless = 0
+    nameless: set[int] = set()
     for location in (one for one in found if one.id not in above):
         place = getattr(location, asked.place)
         if not isinstance(place, str) or not place.strip():
-            nameless += 1
+            nameless.add(location.id)
         elif place in places:
             both = f"{places[place].complete_name} and {location.complete_name}"
             raise InputError(
@@ -184,11 +181,17 @@ def _places(odoo: Odoo, asked: OdooSection, root: int, left_out: list[str]) -> d
             key="odoo.place",
             remedy="set them in Odoo, or choose another of barcode, name, complete_name",
         )
-    if areas:
-        left_out.append(f"locations with others below them: {len(areas)}")
-    if nameless:
-        left_out.append(f"locations without a {asked.place}: {nameless}")
-    return places
+    return places, {
+        "locations with others below them": areas,
+        f"locations without a {asked.place}": nameless,
+    }
+
+
+def _told_of(kind: str, locations: set[int], goods: Iterable[Quant]) -> str:
+    """How many locations of a kind there are, and how many quants lie in them themselves."""
+    there = sum(quant.location_id[0] in locations for quant in goods)
+    told = f"{kind}: {len(locations)}"
+    return f"{told}; quants that lie in them, not compared: {there}" if there else told
 
 
 def _goods_below(root: int) -> Domain:

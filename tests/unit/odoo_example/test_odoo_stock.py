@@ -120,9 +120,24 @@ def test_a_package_of_several_products_has_no_quantity_and_what_has_none_left_is
 def test_a_location_with_others_below_it_is_an_area_and_no_place() -> None:
     hall = _location(1, "WHSTOCK") | {"complete_name": "WH/Stock"}
     bays = [_location(number, f"A-{number}") | {"location_id": [1, "WH/Stock"]} for number in (2, 3)]
-    stock = read_stock(ShelvedOdoo(stock_location=[hall, *bays], stock_quant=[_quant(1, 1)]), _ASKED)
+    stock = read_stock(ShelvedOdoo(stock_location=[hall, *bays]), _ASKED)
     assert stock.expected == {"A-2": [], "A-3": []}
     assert stock.left_out == ("locations with others below them: 1",)
+
+
+def test_what_lies_in_no_place_is_told_by_how_much_it_is() -> None:
+    hall = _location(1, "WHSTOCK") | {"complete_name": "WH/Stock"}
+    below = {"location_id": [1, "WH/Stock"]}
+    locations = [hall, _location(2, "A-1") | below, _location(3, False) | below]
+    quants = [_quant(number, location) for number, location in enumerate((1, 1, 2, 3, 1), 1)]
+    product = {"id": 7, "barcode": _GTIN, "tracking": "none"}
+    odoo = ShelvedOdoo(stock_location=locations, stock_quant=quants, product_product=[product])
+    stock = read_stock(odoo, _ASKED)
+    assert stock.expected == {"A-1": [_GTIN]}
+    assert stock.left_out == (
+        "locations with others below them: 1; quants that lie in them, not compared: 3",
+        "locations without a barcode: 1; quants that lie in them, not compared: 1",
+    )
 
 
 def test_a_label_with_the_bare_number_is_the_same_serial_number() -> None:
