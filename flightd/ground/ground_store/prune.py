@@ -14,7 +14,7 @@ from flightd.adapters.store.kept_looks import KeptLook
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.core.inventory import Standing
 from flightd.ground.ground_store.batch import MOST_LOOKS
-from flightd.ground.ground_store.sender import Target, lacking, missing_pictures
+from flightd.ground.ground_store.sender import Target, lacking, missing_pictures, read_picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,17 +49,31 @@ def prune(folder: Path, target: Target) -> Pruned:
 
 
 def _had(inventory: SqliteStore, older: Sequence[KeptLook], target: Target) -> list[KeptLook]:
-    """Those that the store has, for good, with what was found printed and the pictures that are here."""
+    """Those that the store has, for good, with what was found printed and what is whole here of pictures."""
     if not older:
         return []
     lacked = {look.id for look in lacking(older, target)}
     names = {look.evidence for look in older if look.evidence}
-    missing = {name for name in missing_pictures(names, target) if inventory.evidence.path(name).exists()}
+    missing = {
+        name
+        for name in missing_pictures(names, target)
+        if _is_to_deliver(inventory.evidence.path(name), name)
+    }
     return [
         look
         for look in older
         if look.standing is not Standing.PENDING and look.id not in lacked and look.evidence not in missing
     ]
+
+
+def _is_to_deliver(path: Path, name: str) -> bool:
+    """Whether the picture is here, or may be: one that is damaged is waited for by nobody."""
+    try:
+        return read_picture(path, name) is not None
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
 
 
 def _unlinked(path: Path) -> bool:

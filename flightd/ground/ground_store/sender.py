@@ -5,6 +5,8 @@ has, so a delivery that was cut anywhere goes on where it was, from read-only me
 from __future__ import annotations
 
 import hashlib
+import os
+import stat
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -144,20 +146,34 @@ def _keep_pictures(
     for name in missing_pictures(names, target):
         path = inventory.evidence.path(name)
         try:
-            with path.open("rb") as stream:
-                jpeg = stream.read(MOST_BYTES + 1)
+            jpeg = read_picture(path, name)
         except FileNotFoundError:
             continue
         except OSError as err:
             done.failures.append(f"{path}: {err.strerror or err}; its look waits for it")
             unread.add(name)
             continue
-        if len(jpeg) > MOST_BYTES or picture_name(jpeg) != name:
+        if jpeg is None:
             done.failures.append(f"{path}: the picture is damaged; its look is delivered without it")
             continue
         target.keep_picture(jpeg)
         done.pictures += 1
     return unread
+
+
+def read_picture(path: Path, name: str) -> bytes | None:
+    """The picture at the sender; None for one that is damaged: what lies there is not what its name says.
+    FileNotFoundError without one, OSError for one that cannot be read now."""
+    with open(path, "rb", opener=_opened_at_once) as stream:
+        if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+            return None
+        jpeg = stream.read(MOST_BYTES + 1)
+    return jpeg if len(jpeg) <= MOST_BYTES and picture_name(jpeg) == name else None
+
+
+def _opened_at_once(path: str, flags: int) -> int:
+    """A pipe is not waited for."""
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def missing_pictures(names: Iterable[str], target: Target) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import random
 import sqlite3
 import subprocess
@@ -480,6 +481,24 @@ def test_only_what_the_store_has_is_pruned(store: GroundStore, tmp_path: Path) -
     assert store.counts()["looks"] == 25
 
 
+def test_looks_whose_pictures_are_damaged_are_pruned_once_they_are_in_the_store(
+    store: GroundStore, tmp_path: Path
+) -> None:
+    with SqliteStore(tmp_path / "inventory") as inventory:
+        for number in range(25):
+            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
+        damaged, unread = (inventory.evidence.path(look.evidence) for look, _ in inventory.looks()[:2])
+        damaged.write_bytes(bytes(20))
+        unread.unlink()
+        unread.mkdir()
+        done = Delivered()
+        deliver_inventory(inventory.folder, SITE, "north", store, done)
+        assert len(done.failures) == 2
+        pruned = prune(inventory.folder, store)
+        assert (pruned.looks, pruned.pictures, pruned.stay) == (14, 19, 1)
+        assert (damaged.exists(), unread.exists()) == (False, True)
+
+
 def test_no_inventory_is_copied_for_a_store_that_is_away(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -501,24 +520,26 @@ def test_one_picture_that_is_damaged_or_cannot_be_read_keeps_no_other_look_back(
         for number in range(12):
             inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
         looks = [look for look, _ in inventory.looks()]
-    zeroed, large, unread, gone = (inventory.evidence.path(look.evidence) for look in looks[:4])
+    zeroed, large, unread, gone, pipe = (inventory.evidence.path(look.evidence) for look in looks[:5])
     zeroed.write_bytes(bytes(20))  # what a worn card makes of it
     large.write_bytes(bytes(60_000))
     unread.unlink()
     unread.mkdir()
     gone.unlink()
+    pipe.unlink()
+    os.mkfifo(pipe)
     done = Delivered()
     deliver_inventory(inventory.folder, SITE, "north", store, done)
     assert sorted(done.failures) == sorted(
         [
             *(
                 f"{path}: the picture is damaged; its look is delivered without it"
-                for path in (zeroed, large)
+                for path in (zeroed, large, pipe)
             ),
             f"{unread}: Is a directory; its look waits for it",
         ]
     )
-    assert (done.looks, done.pictures) == (11, 8)
+    assert (done.looks, done.pictures) == (11, 7)
     unread.rmdir()
     unread.write_bytes(b"\xff\xd82")
     again = Delivered()
