@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
 import os
 import shutil
@@ -437,17 +438,47 @@ def test_neither_a_bad_inventory_nor_damaged_decisions_keep_the_others_from_the_
     assert sorted(told) == ["decisions about monday", "inventory sunday", "inventory tuesday"]
 
 
+def _cut_off(folder: Path, cut: Path) -> None:
+    """As a power cut leaves an inventory, of the site `hall 9`."""
+    with SqliteStore(folder) as inventory:
+        inventory.plan([], "hall 9")
+        cut.mkdir()
+        for part in ("", "-wal"):
+            shutil.copy(folder / f"inventory.db{part}", cut)
+    for kept in cut.iterdir():
+        shutil.copy(kept, folder)
+
+
+@pytest.mark.parametrize("is_cut_off", [False, True])
+def test_an_inventory_for_which_there_is_no_room_is_not_copied_all_the_time(
+    hall: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_cut_off: bool
+) -> None:
+    if is_cut_off:  # where it is copied to be asked for its site
+        _cut_off(hall / "monday", tmp_path / "cut")
+    copies: list[Path] = []
+
+    def no_room(file: Path, _: Path) -> None:
+        copies.append(file)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    now_s = 0.0
+    with opened_store(str(tmp_path / "store.db")) as store:
+        feeder = Feeder(store, hall, (), tmp_path / "state", lambda: now_s)
+        with monkeypatch.context() as full:
+            full.setattr(shutil, "copyfile", no_room)
+            for now_s, made in ((0.0, 1), (10.0, 1), (599.0, 1), (600.0, 2), (610.0, 2)):
+                os.utime(hall / "monday" / "inventory.db", (1e9 + now_s,) * 2)  # as a flight does
+                feeder.feed()
+                assert len(copies) == made
+        now_s = 1200.0
+        feeder.feed()
+        assert store.counts()["looks"] == 10
+
+
 def test_an_inventory_that_cannot_be_read_now_is_not_taken_for_one_of_the_log_beside_it(
     hall: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    file, cut = hall / "monday" / "inventory.db", tmp_path / "cut"
-    with SqliteStore(hall / "monday") as inventory:
-        inventory.plan([], "hall 9")
-        cut.mkdir()
-        for part in ("", "-wal"):  # as a power cut leaves them
-            shutil.copy(f"{file}{part}", cut)
-    for kept in cut.iterdir():
-        shutil.copy(kept, hall / "monday")
+    _cut_off(hall / "monday", tmp_path / "cut")
     now_s = 0.0
     with opened_store(str(tmp_path / "store.db")) as store:
         feeder = Feeder(store, hall, (), tmp_path / "state", lambda: now_s)

@@ -19,6 +19,7 @@ from typing import Any
 
 import msgspec
 
+from flightd.adapters.store.unavailable import InventoryUnavailableError
 from flightd.core.errors import FlightdError, InputError
 from flightd.ground.access.audit import audit_files
 from flightd.ground.access.people_book import PeopleBook
@@ -54,6 +55,15 @@ class _Part:
     deliver: Callable[[], bool]
 
 
+@dataclass(frozen=True, slots=True)
+class _PutOff:
+    """What is left alone `until_s`, unless its stamp is another; without one it is however it changes."""
+
+    stamp: object
+    until_s: float
+    why: str
+
+
 class Feeder:
     """Delivers to `store` what lies under `folder` and the `others`, and of the station's `state` people and
     audit.  What cannot be delivered is said once, and tried again and again."""
@@ -74,8 +84,7 @@ class Feeder:
         self._source = platform.node()
         self._done: dict[str, object] = {}
         self._now_s = now_s
-        self._put_off: dict[str, tuple[object, float]] = {}
-        """The stamp of what is wrong, and until when it is left alone."""
+        self._put_off: dict[str, _PutOff] = {}
         self._failures: dict[str, str] = {}
         self._read: dict[bytes, int] = {}
         """How much was delivered of each file of the audit since the station began, by the SHA-256 of its
@@ -105,15 +114,27 @@ class Feeder:
     def _is_due(self, part: _Part) -> bool:
         if self._ending or self._done.get(part.name) == part.stamp:
             return False
-        stamp, until_s = self._put_off.get(part.name, (None, 0.0))
-        return stamp != part.stamp or self._now_s() >= until_s
+        return not self._why_put_off(part.name, part.stamp)
+
+    def _why_put_off(self, what: str, stamp: object) -> str:
+        """Empty for what is not."""
+        known = self._put_off.get(what)
+        if known is None or self._now_s() >= known.until_s:
+            return ""
+        return known.why if known.stamp is None or known.stamp == stamp else ""
+
+    def _leave(self, what: str, stamp: object, err: Exception) -> None:
+        """For a while; the stamp is that of what is wrong."""
+        if isinstance(err, InventoryUnavailableError):
+            stamp = None  # each try may be a copy, and a flight changes it all the time
+        self._put_off[what] = _PutOff(stamp, self._now_s() + _PUT_OFF_S, str(err))
 
     def _deliver(self, part: _Part) -> None:
         try:
             if part.deliver():
                 self._done[part.name] = part.stamp
-        except InputError:
-            self._put_off[part.name] = part.stamp, self._now_s() + _PUT_OFF_S
+        except (InputError, InventoryUnavailableError) as err:
+            self._leave(part.name, part.stamp, err)
             raise
 
     @contextmanager
@@ -132,7 +153,7 @@ class Feeder:
     def _inventories(self) -> Iterator[_Part]:
         decided = None if self._folder is None else _changed(self._folder / DECISIONS)
         for name, written_ns in reversed(self._stores.names()):  # what follows on is soonest taken
-            site, trouble = self._site(name)
+            site, trouble = self._site(name, written_ns)
             deliver = partial(self._deliver_inventory, name, site, trouble)
             yield _Part(f"inventory {name}", (written_ns, site, trouble), deliver)
             if site and decided is not None:
@@ -150,11 +171,15 @@ class Feeder:
         done.check_clocks()
         return True
 
-    def _site(self, name: str) -> tuple[str, str]:
+    def _site(self, name: str, written_ns: int) -> tuple[str, str]:
         """Of which site an inventory is, and why that cannot be told."""
+        what = f"site of {name}"
+        if trouble := self._why_put_off(what, written_ns):
+            return "", trouble
         try:
             return self._stores.site_name(name), ""
         except (FlightdError, OSError) as err:
+            self._leave(what, written_ns, err)
             return "", str(err)
 
     def _deliver_decisions(self, name: str, site: str) -> bool:
