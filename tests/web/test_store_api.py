@@ -74,14 +74,16 @@ class Program:
         status, text = await self._station.ask("GET", f"/api/v1{way}", self._headers)
         return status, json.loads(text)
 
-    async def page(self, way: str) -> dict[str, Any]:
+    async def operation(self, way: str, method: str) -> dict[str, Any]:
         if not self._document:
             self._document = (await self.get("/openapi.json"))[1]
+        found: dict[str, Any] = self._document["paths"][way.partition("?")[0]][method]
+        return found
+
+    async def page(self, way: str) -> dict[str, Any]:
         status, answer = await self.get(way)
         assert status == 200, answer
-        operation = self._document["paths"][way.partition("?")[0]]["get"]
-        schema = operation["responses"]["200"]["content"]["application/json"]["schema"]
-        jsonschema.validate(answer, schema)
+        jsonschema.validate(answer, _schema((await self.operation(way, "get"))["responses"]["200"]))
         assert answer["rows"] or "empty" in way, way
         found: dict[str, Any] = answer
         return found
@@ -90,6 +92,24 @@ class Program:
         body = msgspec.json.encode(value)
         status, text = await self._station.ask("POST", f"/api/v1{way}", {**self._headers, **JSON}, body)
         return status, json.loads(text)
+
+    async def ask(self, value: object) -> tuple[int, Any]:
+        """What the document refuses is refused, and each status is one of the document's."""
+        operation = await self.operation("/questions", "post")
+        status, answer = await self.post("/questions", value)
+        assert str(status) in operation["responses"]
+        if jsonschema.Draft202012Validator(_schema(operation["requestBody"])).is_valid(value):
+            assert status == 200 or "there is no site" in answer["refused"], answer
+        else:
+            assert status == 400
+        if status == 200:
+            jsonschema.validate(answer, _schema(operation["responses"]["200"]))
+        return status, answer
+
+
+def _schema(of: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = of["content"]["application/json"]["schema"]
+    return found
 
 
 @asynccontextmanager
@@ -109,7 +129,7 @@ async def test_a_program_asks_what_lies_at_places_and_is_told_which_there_are_no
     async with asked(hall, tmp_path / "state", Scope.STOCK, Scope.ASK) as program:
         for _ in range(2):  # an answer may be lost on its way
             sent = {"site": SITE, "questions": [one, {"location": "AL-09"}]}
-            assert await program.post("/questions", sent) == (200, {"asked": 1, "unknown": ["AL-09"]})
+            assert await program.ask(sent) == (200, {"asked": 1, "unknown": ["AL-09"]})
         (question,) = (await program.page(f"/questions?{_QUERY}"))["rows"]
         assert {name: question[name] for name in one} == one
         assert (question["who"], question["answered"]) == ("wms", None)
@@ -121,9 +141,14 @@ async def test_a_program_asks_what_lies_at_places_and_is_told_which_there_are_no
             ({"site": SITE, "questions": [{"place": "AL-01-1-1"}]}, "place"),
             ({"site": SITE, "questions": [one | {"reason": "a\nb"}]}, "reason"),
         ):
-            status, answer = await program.post("/questions", wrong)
+            status, answer = await program.ask(wrong)
             assert status == 400
             assert why in answer["refused"]
+        assert "404" not in (await program.operation("/questions", "post"))["responses"]
+        long = "\N{CJK UNIFIED IDEOGRAPH-67F1}" * 190
+        most = [{"location": f"{long}{n}", "reason": long + "x" * 10, "reference": long} for n in range(1000)]
+        status, answer = await program.ask({"site": SITE, "questions": most})
+        assert (status, answer["asked"], len(answer["unknown"])) == (200, 0, 1000)
 
 
 @in_real_time

@@ -14,6 +14,9 @@ LIMIT, MOST = 100, 1000
 """Rows of a page."""
 MOST_CHARS, MOST_QUESTIONS = 200, 1000
 """Of a text that is asked with; of one request."""
+MOST_QUESTION_BYTES = 4 << 20
+PLAIN_CHARS = r"[^\x00-\x1f]*"
+"""No control characters."""
 Rows: TypeAlias = list[dict[str, Any]]
 
 

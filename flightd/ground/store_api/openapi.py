@@ -10,7 +10,9 @@ from flightd.ground.store_api.endpoints import (
     LIMIT,
     MOST,
     MOST_CHARS,
+    MOST_QUESTION_BYTES,
     MOST_QUESTIONS,
+    PLAIN_CHARS,
     STATES,
     Endpoint,
     Parameter,
@@ -122,7 +124,7 @@ def _operation(endpoint: Endpoint) -> dict[str, Any]:
 
 def _asking() -> dict[str, Any]:
     """What a program asks of places."""
-    text = {"type": "string", "maxLength": MOST_CHARS}
+    text = {"type": "string", "maxLength": MOST_CHARS, "pattern": f"^{PLAIN_CHARS}$"}
     one = {
         "type": "object",
         "required": ["location"],
@@ -144,11 +146,18 @@ def _asking() -> dict[str, Any]:
         "properties": {"asked": {"type": "integer"}, "unknown": _KINDS["texts"]},
     }
     answer = {"description": "How many are asked, and which places the store does not know."}
+    refused = _refused()
+    del refused["404"]  # of a site that it does not know, what is sent is wrong
+    body = {
+        "description": f"At most {MOST_QUESTION_BYTES >> 20} MiB; of a site that the store knows.",
+        "required": True,
+        "content": {"application/json": {"schema": new}},
+    }
     return {
         "operationId": "ask",
         "summary": "Ask what lies at places now; what is open by the same reference stays as it is.",
-        "requestBody": {"required": True, "content": {"application/json": {"schema": new}}},
-        "responses": {"200": answer | {"content": {"application/json": {"schema": told}}}, **_refused()},
+        "requestBody": body,
+        "responses": {"200": answer | {"content": {"application/json": {"schema": told}}}, **refused},
     }
 
 

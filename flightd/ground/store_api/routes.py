@@ -26,7 +26,9 @@ from flightd.ground.store_api.endpoints import (
     LIMIT,
     MOST,
     MOST_CHARS,
+    MOST_QUESTION_BYTES,
     MOST_QUESTIONS,
+    PLAIN_CHARS,
     STATES,
     Endpoint,
     Parameter,
@@ -37,7 +39,6 @@ from flightd.vision.shelf.evidence_jpeg import MOST_BYTES
 
 PREFIX = "/api/v1"
 _AT_ONCE, _MOST_WAITING = 3, 32
-_MOST_QUESTION_BYTES = 1 << 20
 _Names = Annotated[list[Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]], Meta(max_length=1000)]
 
 
@@ -47,7 +48,7 @@ class Asked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     names: _Names
 
 
-_Text = Annotated[str, Meta(max_length=MOST_CHARS, pattern=r"^[^\x00-\x1f]*\Z")]
+_Text = Annotated[str, Meta(max_length=MOST_CHARS, pattern=rf"^{PLAIN_CHARS}\Z")]
 
 
 class AskedOf(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -82,7 +83,7 @@ def store_routes(store: GroundStore | None) -> list[BaseRoute]:
         )
 
     async def ask(request: Request) -> Response:
-        new = await said(request, NewQuestions, "questions", _MOST_QUESTION_BYTES)
+        new = await said(request, NewQuestions, "questions", MOST_QUESTION_BYTES)
         questions = [Question(one.location, one.reason, one.reference) for one in new.questions]
         who = identity_of(request).name
         unknown = await threads.run(store.ask, new.site, who, questions)
