@@ -33,9 +33,11 @@ class StepTable:
         self._beside: Sequence[Sequence[int]] = [over[vertex.node] for vertex in net.lanes.vertices]
 
     def prepare(self) -> None:
-        """Make all that may be asked for: a third of the first plans' time, for which drones would wait."""
+        """Make all that is asked for: a third of the first plans' time, for which drones would wait.  Nobody
+        flies through a section from inside it."""
         for configuration in range(len(self._beside) << 3):
-            self.through(configuration)
+            make = self.through if self.sections[configuration >> 3] == NONE else self.onward
+            make(configuration)
 
     def onward(self, configuration: int) -> tuple[Step, ...]:
         """Every motion that begins there.  A turn sweeps nothing but the air in which the drone is safe
