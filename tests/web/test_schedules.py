@@ -211,20 +211,24 @@ async def test_a_run_that_is_due_starts_one_flight_however_the_clock_jumps_and_t
 async def test_where_the_site_file_does_not_allow_it_nothing_starts_and_it_is_told_as_missed(
     tmp_path: Path,
 ) -> None:
-    clock = Clock("2026-10-20T12:00")
+    clock, viewer = Clock("2026-10-20T12:00"), Viewer()
     with LiveFlight(replace(SITE, unattended_start=False), CONFIG) as flight:
         status, command = flight.ports
-        address = Address("127.0.0.1", status, command)
-        async with served(("demo", address), folder=tmp_path, clock=clock.station) as station:
+        drone = ("demo", Address("127.0.0.1", status, command))
+        async with served(drone, folder=tmp_path, viewers=[viewer], clock=clock.station) as station:
             await ask(station, "PUT", "/schedule-1", **TUESDAYS)
             clock.set("2026-10-20T20:00")
             waits = await run_is(station, "waiting", "rules")
             assert waits["why"] == "the site file of demo does not say unattended_start = true"
+            await viewer.until(lambda told: told["link"].attends)
             clock.set("2026-10-20T21:00")
             missed = await run_is(station, "missed")
             assert (missed["cause"], missed["why"]) == ("rules", waits["why"])
             assert flight.phase == "preflight"
-            assert flight.quiet_s == 0.0, "nobody is missed who attended a start that did not come"
+            await viewer.until(lambda told: not told["link"].attends)
+            async with Within(60):  # from now on it grows for ever if anybody is missed
+                while flight.quiet_s != 0.0:
+                    await asyncio.sleep(0.02)
 
 
 @in_real_time
