@@ -21,6 +21,7 @@ from flightd.runtime.within import Within
 from flightd.site.site_file import load_site
 from tests.rigs.brisk import BRISK
 from tests.rigs.event_loops import in_real_time
+from tests.rigs.waiting import until
 from tests.web.live_flight import LiveFlight
 from tests.web.people_rig import audited, with_people
 from tests.web.served import JSON, Station, served
@@ -226,9 +227,7 @@ async def test_where_the_site_file_does_not_allow_it_nothing_starts_and_it_is_to
             assert (missed["cause"], missed["why"]) == ("rules", waits["why"])
             assert flight.phase == "preflight"
             await viewer.until(lambda told: not told["link"].attends)
-            async with Within(60):  # from now on it grows for ever if anybody is missed
-                while flight.quiet_s != 0.0:
-                    await asyncio.sleep(0.02)
+            await until(lambda: flight.quiet_s == 0.0, 60)  # it grows for ever if anybody is missed
 
 
 @in_real_time
