@@ -111,7 +111,8 @@ async def test_missions_are_kept_over_http_with_one_clear_line_for_bad_input(tmp
             assert code == 400, wrong
             assert "\n" not in said["refused"]
         assert (await ask(station, "PUT", "/mission-2", **good))[0] == 409
-        assert (await ask(station, "PUT", "/x", **good))[0] == 400
+        refused = {"refused": "an id has 8 to 64 characters"}
+        assert await ask(station, "PUT", "/x", **good) == (400, refused)
         code, _ = await station.ask("PUT", "/api/missions/mission-3", JSON, json.dumps(good).encode())
         assert code == 403, "a page of another origin changes nothing"
         assert (await ask(station, "DELETE", "/mission-1"))[0] == 200

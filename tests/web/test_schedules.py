@@ -148,7 +148,8 @@ async def test_schedules_are_kept_with_their_next_runs_and_one_clear_line_for_ba
             assert "\n" not in told["refused"]
         code, told = await ask(station, "PUT", "/schedule-2", **TUESDAYS)
         assert (code, told["refused"]) == (409, "there is a schedule 'Aisle A' already; give another name")
-        assert (await ask(station, "PUT", "/x", **{**TUESDAYS, "name": "B"}))[0] == 400
+        refused = {"refused": "an id has 8 to 64 characters"}
+        assert await ask(station, "PUT", "/x", **{**TUESDAYS, "name": "B"}) == (400, refused)
         assert (await ask(station, "DELETE", "/schedule-1"))[0] == 200
         assert (await ask(station, "DELETE", "/schedule-1"))[0] == 404
     async with served(NOBODY) as station:

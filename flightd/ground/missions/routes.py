@@ -179,7 +179,7 @@ class _Missions:
         """Keep a mission, new or in place of the one with its id."""
         kept, identity = await said(request, Kept, "a mission", _MOST_BYTES), request.path_params["mission"]
         if not 8 <= len(identity) <= 64:
-            raise InputError("not the id of a mission")
+            raise InputError("an id has 8 to 64 characters")
         name = " ".join(kept.name.split())
         if not name:
             raise InputError("a mission needs a name")

@@ -57,7 +57,7 @@ class _Desk:
         """Keep a schedule, new or in place of the one with its id, from now on."""
         kept, identity = await said(request, Kept, "a schedule", _MOST_BYTES), request.path_params["schedule"]
         if not 8 <= len(identity) <= 64:
-            raise InputError("not the id of a schedule")
+            raise InputError("an id has 8 to 64 characters")
         checked = kept.checked()
         note_act(request, f"{checked.name} of {checked.site}")
         schedule = await self._threads.run(self._kept_in().keep, identity, checked, self._utc_ns())
