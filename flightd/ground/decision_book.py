@@ -94,7 +94,7 @@ class DecisionBook:
 
     def decisions(self, store: str) -> list[Decision]:
         """All about a store's places, oldest first."""
-        if not self._database.file.exists():
+        if not self._database.is_there:
             return []
         with self._database.opened() as book:
             rows = book.execute(

@@ -127,7 +127,7 @@ class ExpectedStockBook:
         return None if row is None else bytes(row[0])
 
     def _read(self, table: str, question: str, *values: str) -> tuple[Any, ...] | None:
-        if not self._database.file.exists():
+        if not self._database.is_there:
             return None
         with self._database.opened() as book:
             if not book.execute("SELECT 1 FROM sqlite_schema WHERE name = ?", (table,)).fetchone():

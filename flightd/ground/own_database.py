@@ -54,6 +54,18 @@ class OwnDatabase:
             except (sqlite3.DatabaseError, ValueError) as err:
                 raise InputError(f"{self.file}: not {self.holds} of a ground station: {err}") from err
 
+    @property
+    def is_there(self) -> bool:
+        """Asks the system itself: `Path.exists` raises for a folder that is another user's, or tells that
+        there is nothing in it.  UnavailableError where the system does not say."""
+        try:
+            self.file.stat()
+        except FileNotFoundError:
+            return False
+        except OSError as err:
+            raise UnavailableError(f"{self.file}: {err.strerror}", remedy=self.remedy) from None
+        return True
+
     @contextmanager
     def changed(self) -> Iterator[sqlite3.Connection]:
         """The file, and all that is done with it at once or not at all.  Errors as of `opened`."""

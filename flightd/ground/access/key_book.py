@@ -59,7 +59,7 @@ class KeyBook:
 
     def all(self) -> list[ScopedKey]:
         """All of them, by name."""
-        if not self._database.file.exists():
+        if not self._database.is_there:
             return []
         with self._database.opened() as book:
             rows = book.execute("SELECT name, hash, scopes, made_s FROM key ORDER BY name").fetchall()

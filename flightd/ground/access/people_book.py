@@ -95,7 +95,7 @@ class PeopleBook:
 
     def read(self) -> tuple[list[Person], list[Session]]:
         """Everybody and every session, at one moment."""
-        if not self.file.exists():
+        if not self._database.is_there:
             return [], []
         with self._database.changed() as book:
             people = book.execute("SELECT name, role, password, key FROM person ORDER BY name").fetchall()

@@ -161,7 +161,7 @@ class FleetMemory:
 
     def closures(self) -> tuple[KeptClosure, ...]:
         """What was closed last, by whatever flightd and for whichever drones."""
-        if not self._database.file.exists():
+        if not self._database.is_there:
             return ()
         with self._database.opened() as kept:
             found = _get(kept, "closed", _KeptClosures)
@@ -170,7 +170,7 @@ class FleetMemory:
     def read(self) -> tuple[KeptFloor, KeptFleet] | None:
         """What the station before knew; None where none flew a fleet.  Work that waited too long is told as
         not done; that of a run, once its time is over, too."""
-        if not self._database.file.exists():
+        if not self._database.is_there:
             return None
         with self._database.opened() as kept:
             floor, fleet = _get(kept, "floor", KeptFloor), _get(kept, "fleet", KeptFleet)

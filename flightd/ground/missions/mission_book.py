@@ -69,7 +69,7 @@ class MissionBook:
 
     def missions(self, site: str) -> list[Mission]:
         """All of a site, by their names."""
-        if not self._database.file.exists():
+        if not self._database.is_there:
             return []
         with self._database.opened() as book:
             rows = book.execute(_ALL, (site,)).fetchall()
@@ -78,7 +78,7 @@ class MissionBook:
     def mission(self, mission_id: str) -> Mission:
         """InputError where there is none."""
         found = None
-        if self._database.file.exists():
+        if self._database.is_there:
             with self._database.opened() as book:
                 found = _found(book, mission_id)
         if found is None:
@@ -128,7 +128,7 @@ class MissionBook:
 
     def left(self, plan: str, remaining: Sequence[str]) -> None:
         """What a drone tells that is left of a plan; that of no mission changes nothing."""
-        if not self._database.file.exists():
+        if not self._database.is_there:
             return
         with self._database.opened() as book:
             book.execute(

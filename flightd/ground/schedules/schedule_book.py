@@ -117,7 +117,7 @@ class ScheduleBook:
 
     def schedules(self, site: str = "") -> tuple[list[Schedule], list[DamagedSchedule]]:
         """All, or those of a site, by their names; and those that cannot be read."""
-        if not self._database.file.exists():
+        if not self._database.is_there:
             return [], []
         with self._database.opened() as book:
             rows = book.execute(
@@ -164,7 +164,7 @@ class ScheduleBook:
 
     def runs(self, schedule: str, most: int = MOST_RUNS, since: date = date.min) -> list[Run]:
         """The newest of a schedule, newest first."""
-        if not self._database.file.exists():
+        if not self._database.is_there:
             return []
         with self._database.opened() as book:
             rows = book.execute(_RUNS, (schedule, since.isoformat(), most)).fetchall()

@@ -80,6 +80,17 @@ def test_wrong_input_is_one_line(run: Run, words: tuple[str, ...], typed: str, s
     assert err.startswith(f"flightd: {said}")
 
 
+@pytest.mark.parametrize("words", [("people", "list"), ("keys", "list"), ("audit",)])
+def test_a_state_folder_that_cannot_be_looked_into_is_one_line_and_not_nobody(
+    run: Run, tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    (tmp_path / "state").write_text("a file, no folder", encoding="utf-8")
+    code, out, err = run(*words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"flightd: {tmp_path / 'state'}")
+    assert "Not a directory; be the user that the station runs as" in err
+
+
 def test_at_a_terminal_the_password_is_typed_twice_and_not_shown(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "flightd", "ground", "people", "add", "ann", "--state", str(tmp_path)]
     main_end, terminal = pty.openpty()
