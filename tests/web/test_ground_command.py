@@ -61,7 +61,9 @@ def _own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (["--listen", "0.0.0.0", "--foxglove", "127.0.0.1:0"], "--foxglove: everybody shall sign in, and"),
         (["--fleet", "--mqtt", "mqtt://h", "--mqtt-orders"], "--fleet: the fleet's manager flies the drones"),
         (["--fleet-charged", "80"], "--fleet-charged 80: there is no fleet whose drones could wait"),
-        (["--fleet", "--mqtt-body", "round"], "--mqtt-body: 'round' is no size of a drone"),
+        (["--evidence", "pictures"], "--evidence: there is no store whose pictures could lie there"),
+        (["--mqtt-version", "9"], "--mqtt-version: there is no version '9'; give 2.1 or 3.0"),
+        (["--mqtt-body", "round"], "--mqtt-body: 'round' is no size of a drone"),
         (["--foxglove", "0.0.0.0"], "--foxglove 0.0.0.0: reaches beyond this machine, and Foxglove"),
     ],
 )  # fmt: skip

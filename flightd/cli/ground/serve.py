@@ -19,6 +19,8 @@ from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
     from flightd.adapters.ground_link.client import Address
+    from flightd.fleet.vda5050.codec import Version
+    from flightd.fleet.vehicle.drone_factsheet import Measures
     from flightd.ground.access.access import Access
     from flightd.ground.fleet.own_fleet import OwnFleet
     from flightd.ground.foxglove_view.live_server import FoxgloveServer
@@ -192,6 +194,7 @@ def ground(
 
         raise missing_extra("ground", "flightd ground") from None
     from flightd.ground.drone_names import drone_addresses
+    from flightd.ground.mqtt.broker_address import read_body, read_version
     from flightd.ground.station_lock import only_station
     from flightd.ground.tls import read_certificate
 
@@ -203,6 +206,11 @@ def ground(
             key="--fleet",
             remedy="leave out --fleet or --mqtt-orders",
         )
+    if evidence is not None and store is None:
+        raise InputError(
+            "there is no store whose pictures could lie there", key="--evidence", remedy="give --store FILE"
+        )
+    version, body = read_version(mqtt_version), read_body(mqtt_body)
     if not 5.0 <= mqtt_hold <= 3600.0:
         raise InputError("expected 5 to 3600 s", key=f"--mqtt-hold {mqtt_hold:g}")
     if not 0.0 <= fleet_charged <= 100.0:
@@ -228,9 +236,9 @@ def ground(
             viewer = stack.enter_context(_foxglove_server(foxglove, access.login, drones))
         at = "" if viewer is None else viewer.url
         hold_s = mqtt_hold if mqtt_orders else None
-        link = None if mqtt is None else _fleet_link(mqtt, mqtt_version, mqtt_body, drones, access, hold_s)
+        link = None if mqtt is None else _fleet_link(mqtt, version, body, drones, access, hold_s)
         own_fleet = (
-            _own_fleet(mqtt_body, drones, access, mqtt_hold, state_folder(state), fleet_charged / 100.0)
+            _own_fleet(body, drones, access, mqtt_hold, state_folder(state), fleet_charged / 100.0)
             if fleet
             else None
         )
@@ -293,16 +301,16 @@ def _foxglove_server(address: str, login: bool, drones: Sequence[tuple[str, Addr
 
 def _fleet_link(
     url: str,
-    version: str,
-    body: str,
+    version: Version,
+    body: Measures,
     drones: Sequence[tuple[str, Address]],
     access: Access,
     hold_s: float | None,
 ) -> FleetLink:
     """With orders where a drone `hold_s` without one."""
-    from flightd.ground.mqtt.broker_address import read_body, read_broker, read_version
+    from flightd.ground.mqtt.broker_address import read_broker
 
-    broker, of, measures = read_broker(url), read_version(version), read_body(body)
+    broker = read_broker(url)
     try:
         from flightd.ground.mqtt.fleet_link import MANAGER, FleetLink
         from flightd.ground.mqtt.managed_drone import OrderRules
@@ -315,11 +323,11 @@ def _fleet_link(
         access.write_down(MANAGER, broker.shown, act, drone, outcome=outcome, text=text)
 
     rules = None if hold_s is None else OrderRules(hold_s, write_down)
-    return FleetLink([name for name, _ in drones], broker, of, measures, rules)
+    return FleetLink([name for name, _ in drones], broker, version, body, rules)
 
 
 def _own_fleet(
-    body: str,
+    body: Measures,
     drones: Sequence[tuple[str, Address]],
     access: Access,
     hold_s: float,
@@ -328,16 +336,13 @@ def _own_fleet(
 ) -> OwnFleet:
     from flightd.ground.fleet.fleet_memory import FleetMemory
     from flightd.ground.fleet.own_fleet import TRAFFIC, OwnFleet
-    from flightd.ground.mqtt.broker_address import read_body
     from flightd.ground.mqtt.managed_drone import OrderRules
 
     def write_down(act: str, drone: str, outcome: str, text: str) -> None:
         access.write_down(TRAFFIC, "", act, drone, outcome=outcome, text=text)
 
     rules, memory = OrderRules(hold_s, write_down), FleetMemory(folder)
-    return OwnFleet(
-        [name for name, _ in drones], read_body(body), rules, memory=memory, charged_frac=charged_frac
-    )
+    return OwnFleet([name for name, _ in drones], body, rules, memory=memory, charged_frac=charged_frac)
 
 
 def _say_where(foxglove: str, where: Listening) -> None:

@@ -14,6 +14,8 @@ from flightd.ground.ground_store.engine import Row, Session
 
 _APPLICATION = 0x666C7473
 """`flts`: SQLite's application id, so that another program's file is told apart."""
+_REFUSED = (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
+"""By the disk; the lower byte of SQLite's extended codes."""
 _CONNECTIONS = 4
 _WAIT_S = 10.0
 _CACHE_KB = 65_536
@@ -87,7 +89,9 @@ class SqliteEngine:
                 connection.execute("COMMIT")
         except (OSError, sqlite3.OperationalError) as err:
             text = err.strerror if isinstance(err, OSError) else str(err)
-            raise UnavailableError(f"the store answers: {text}", file=self._file) from err
+            refused = isinstance(err, OSError) or getattr(err, "sqlite_errorcode", 0) & 0xFF in _REFUSED
+            remedy = "may flightd write there?" if refused else ""
+            raise UnavailableError(f"the store answers: {text}", file=self._file, remedy=remedy) from err
         except sqlite3.DatabaseError as err:
             raise InputError(f"no ground store, or a damaged one: {err}", file=self._file) from err
 

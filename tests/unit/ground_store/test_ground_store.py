@@ -659,6 +659,13 @@ def test_a_store_from_before_places_told_how_full_they_are_is_taken_over(
         }
 
 
+def test_a_file_that_the_disk_refuses_is_told_with_what_to_look_at(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    for refused in (tmp_path / "file" / "store.db", Path("/proc/store.db")):
+        with pytest.raises(UnavailableError, match=r": the store answers: .*; may flightd write there\?$"):
+            GroundStore(SqliteEngine(refused), FolderEvidence(tmp_path))
+
+
 def test_a_database_that_cannot_be_had_is_told_in_a_line(tmp_path: Path) -> None:
     evidence = FolderEvidence(tmp_path)
     with pytest.raises(UnavailableError) as caught:
