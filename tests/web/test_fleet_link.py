@@ -101,7 +101,9 @@ def test_a_broker_that_dies_stops_nothing_and_is_found_again(
 
     with mosquitto(tmp_path) as broker:
         real(and_a_turn(go(broker)))
-    assert f"demo: {broker.url}: " in caplog.text
+    lines = [line.rpartition(f"demo: {broker.url}: ")[2] for line in caplog.messages if "demo: " in line]
+    assert lines[0].endswith("; it is tried again")
+    assert lines[1] == "connected"
 
 
 def test_an_error_about_a_drone_or_its_connection_ends_no_station(

@@ -64,7 +64,8 @@ class DroneAtBroker:
                 await self._connected()
             except* aiomqtt.MqttError as group:
                 if not self._failures:
-                    _LOG.warning("%s: %s: %s", self._name, self._broker.shown, group.exceptions[0])
+                    why = group.exceptions[0]
+                    _LOG.warning("%s: %s: %s; it is tried again", self._name, self._broker.shown, why)
             except* Exception:  # noqa: BLE001 - an error of ours
                 if not self._failures:
                     _LOG.error("%s at the broker: it failed, and begins anew", self._name, exc_info=True)
@@ -74,6 +75,8 @@ class DroneAtBroker:
     async def _connected(self) -> None:
         vehicle = self._drone.vehicle
         async with self._client() as client:
+            if self._failures:
+                _LOG.warning("%s: %s: connected", self._name, self._broker.shown)
             self._failures = 0
             try:
                 async with asyncio.TaskGroup() as tasks:
