@@ -113,6 +113,10 @@ def export(
 
     if onto is not None and kind is not Kind.LIF:
         raise InputError("only a LIF is written onto another", key="--onto", remedy="leave out --as")
+    if vehicle and onto is None:
+        raise InputError(
+            "it says of which vehicles the ways of a LIF are", key="--vehicle", remedy="give --onto LIF, too"
+        )
     site, made = load_site(site_file), EXPORTS[kind]
     target = out if out is not None else site_file.with_name(f"{site_file.stem}{made.suffix}")
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

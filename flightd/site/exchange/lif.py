@@ -139,7 +139,7 @@ def _nodes(layout: Layout, vehicle: str) -> dict[str, tuple[float, float]]:
         if not node.node_id:
             raise InputError(f"layouts[0].nodes[{i}] has no 'nodeId'")
         if node.node_id in nodes:
-            raise InputError(f"nodes[{i}]: nodeId {node.node_id!r} comes twice")
+            raise InputError(f"layouts[0].nodes[{i}].nodeId: {node.node_id!r} comes twice")
         nodes[node.node_id] = _place(node.node_position)
     return {node.node_id: nodes[node.node_id] for node in layout.nodes if _is_for(node, vehicle)}
 
@@ -165,9 +165,9 @@ def _ways(
     away: list[tuple[str, str]] = []
     for i, edge in enumerate(layouts[0].edges):
         way = edge.start_node_id, edge.end_node_id
-        for node in way:
+        for end, node in zip(("start", "end"), way, strict=True):
             if node not in here | elsewhere:
-                raise InputError(f"edges[{i}]: there is no node {node!r}")
+                raise InputError(f"layouts[0].edges[{i}].{end}NodeId: there is no node {node!r}")
         if way[0] not in here or way[1] not in here:
             away.append(way)
         elif _is_for(edge, vehicle) and way[0] in nodes and way[1] in nodes and way[0] != way[1]:

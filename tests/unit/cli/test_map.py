@@ -174,6 +174,7 @@ def test_a_map_goes_back_onto_the_file_that_it_came_from(flightd: Command, tmp_p
             f"{base}: no vehicle type is called 'x'; the file has",
         ),
         ((*onto, "--as", "csv"), "--onto: only a LIF is written onto another; leave out --as"),
+        (("map", "export", site, "--vehicle", "acme.drone"), "--vehicle: it says of which vehicles the ways"),
         (("map", "export", site, "--onto", tmp_path), f"{tmp_path}: cannot read it"),
         (("map", "export", site, "--onto", site), f"{site}: this is no JSON, and so no LIF"),
     ):

@@ -136,12 +136,18 @@ def test_a_foreign_layout_is_turned_straightened_and_named_and_says_so() -> None
         (lambda told: told.update(layouts=3), "this is no LIF"),
         (lambda told: told["layouts"].__setitem__(0, None), "no JSON object"),
         (lambda told: told["layouts"][0].pop("nodes"), "no list 'nodes'"),
-        (lambda told: told["layouts"][0]["nodes"].append(told["layouts"][0]["nodes"][0]), "comes twice"),
+        (
+            lambda told: told["layouts"][0]["nodes"].insert(1, told["layouts"][0]["nodes"][0]),
+            "layouts[0].nodes[1].nodeId: 'N10' comes twice",
+        ),
         (lambda told: told["layouts"][0]["nodes"][0].pop("nodeId"), "nodes[0] has no 'nodeId'"),
         (lambda told: told["layouts"][0]["nodes"][0]["nodePosition"].update(x="east"), "x is no number"),
         (lambda told: told["layouts"][0]["nodes"][0]["nodePosition"].update(y=math.nan), "y is no number"),
         (lambda told: told["layouts"][0]["nodes"][0]["nodePosition"].update(y=1e9), "10,000 m"),
-        (lambda told: told["layouts"][0]["edges"][0].update(endNodeId="?"), "there is no node '?'"),
+        (
+            lambda told: told["layouts"][0]["edges"][0].update(endNodeId="?"),
+            "layouts[0].edges[0].endNodeId: there is no node '?'",
+        ),
         (lambda told: told["layouts"][0].update(edges=[]), "there is no aisle"),
     ],
 )
