@@ -100,8 +100,7 @@ def _in_words(d: dict[str, object]) -> list[str]:
         f" {d['places_per_hour']:g} an hour, {_hours(d['flown_s'])} in the air",
         f"shared cells {d['shared_cells']}, deadlocks {d['deadlocks']},"
         f" below the reserve {d['below_reserve']}, places without an answer {d['unanswered']}",
-        f"least distance of two drones {d['least_distance_m']} m, least charge {d['least_charge']},"
-        f" planned {d['replans']} times",
+        f"{_distance(d['least_distance_m'])}least charge {d['least_charge']}, planned {d['replans']} times",
         f"killed: the station {d['hub_kills']} times, all links {d['broker_kills']} times",
     ]
     lines += _dock_lines(d)
@@ -115,6 +114,11 @@ def _in_words(d: dict[str, object]) -> list[str]:
     if "speed_up" in d:
         lines.append(f"speed-up over one drone {d['speed_up']}")
     return lines
+
+
+def _distance(least_m: object) -> str:
+    """Nothing of a drone alone."""
+    return "" if least_m is None else f"least distance of two drones {least_m} m, "
 
 
 def _dock_lines(d: dict[str, object]) -> list[str]:

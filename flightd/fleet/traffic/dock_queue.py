@@ -204,7 +204,8 @@ class DockQueue:
             )
             self._give(drone, (over,), dock, now_ms)
             return
-        self._tell(f"{drone} has no contact on dock {dock.name} after {landings} landings: it takes another")
+        none = f"{drone} has no contact on dock {dock.name} after {landings} landings"
+        self._tell(f"{none}: it takes another, if there is one")
         self._landings.pop(drone)
         self._shunned.setdefault(drone, set()).add(dock.name)
         self._go_home(drone, now_ms)
