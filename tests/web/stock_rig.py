@@ -44,12 +44,13 @@ def cell(page: Page, place: str) -> Locator:
     return page.get_by_role("button", name=re.compile(rf"^{re.escape(place)},"))
 
 
-def picture_of(text: str) -> bytes:
-    """A JPEG in which the QR code of the text is."""
-    modules = np.array([list(row) for row in segno.make_qr(text).matrix], np.uint8)
-    code = np.kron(1 - modules, np.ones((5, 5), np.uint8)) * 255
+def picture_of(*texts: str) -> bytes:
+    """A JPEG in which the QR codes of the texts are, three at most."""
     picture = np.full((360, 480), 200, np.uint8)
-    picture[60 : 60 + code.shape[0], 240 : 240 + code.shape[1]] = code
+    for text, (top, left) in zip(texts, ((60, 240), (220, 40), (220, 240)), strict=False):
+        modules = np.array([list(row) for row in segno.make_qr(text).matrix], np.uint8)
+        code = np.kron(1 - modules, np.ones((5, 5), np.uint8)) * 255
+        picture[top : top + code.shape[0], left : left + code.shape[1]] = code
     return evidence_jpeg(np.repeat(picture[:, :, None], 3, axis=2))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
@@ -26,7 +26,7 @@ from flightd.app.log_study.recorded_simulation import recorded_simulation
 from flightd.app.recording import SETTING_TOPICS, recorded_setting
 from flightd.app.simulation.judgement import judge_flight
 from flightd.core.errors import InputError
-from flightd.core.inventory import Standing
+from flightd.core.inventory import KnownLocations, LocationRecord, Observation, Standing
 from flightd.core.topics import Topic
 from flightd.core.types import Image
 from flightd.replay.decision_compare import comparison_document, replay_decisions
@@ -88,19 +88,25 @@ def _codes(path: Path, folder: Path) -> Finding:
     with opened_for_reading(folder, untouched=True) as inventory:  # a release on trial takes none over
         found = inventory.looks_of_run(run) if run else inventory.looks()  # an old log does not say its run
         looks = [seen for seen, standing in found if standing is Standing.CONFIRMED]
-        evidence = inventory.evidence
+        evidence, places = inventory.evidence, inventory.locations()
     if not looks:
         return Finding(Outcome.NOTHING, f"the inventory has no confirmed look of its run {run}".rstrip())
+    newest = {seen.location: seen for seen in looks}
+    told_anywhere = _told_anywhere(places, newest.values())
+    labels = {place.code for place in places}
+    known = KnownLocations(labels)
     pictures = gone = same = more = 0
     lost: list[str] = []
     other: list[str] = []
-    for seen in {seen.location: seen for seen in looks}.values():
+    for seen in newest.values():
         before, picture = {read.text for read in seen.reads}, _kept(evidence, seen.evidence)
         if picture is None:
             gone += bool(before)
             continue
         pictures += 1
-        now = {read.text for read in read_codes(picture) if read.believed}
+        read = {read.text for read in read_codes(picture) if read.believed}
+        # the picture shows the place's own label, too, and may show a neighbour's goods
+        now = {text for text in read - (told_anywhere - before) if known.spelled(text) not in labels}
         if not before:
             more += bool(now)
         elif now == before:
@@ -120,6 +126,14 @@ def _codes(path: Path, folder: Path) -> Finding:
         "lost": sorted(lost), "otherwise": sorted(other),
     }  # fmt: skip
     return same_or("; ".join(told), figures)
+
+
+def _told_anywhere(places: Iterable[LocationRecord], looks: Iterable[Observation]) -> set[str]:
+    """Every code that was told of a place, as it counts now or by the `looks`, with what stayed undecided."""
+    told = {text for place in places for text in place.texts}
+    return told.union(
+        *({read.text for read in seen.reads} | {code.text for code in seen.undecided} for seen in looks)
+    )
 
 
 def _kept(evidence: EvidenceFolder, name: str) -> Image | None:

@@ -31,7 +31,7 @@ from flightd.app.log_study.ray_engine import run_ray
 from flightd.app.log_study.sources import LogSource, log_sources
 from flightd.config.schema import load_config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
-from flightd.core.inventory import LocationState
+from flightd.core.inventory import LocationState, PlannedLocation
 from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.replay.log import read_log
 from tests.command import Command
@@ -167,6 +167,33 @@ def test_a_flights_labels_are_those_of_its_own_run_wherever_its_inventory_is(
     ]
     assert json.loads(flightd(*studied).stdout)["outcomes"]["codes"] == {"nothing": 3}
     assert inventory_files(tmp_path / "inventory") == before
+
+
+def test_a_places_own_label_and_a_neighbours_goods_in_its_picture_are_no_difference(
+    flightd: Command, tmp_path: Path
+) -> None:
+    with McapRecorder(tmp_path / "flight.mcap", metadata={"run": "monday"}, when_full=wait_for_disk):
+        pass
+    shown = {
+        "A-1": ("PAL-1", "a-1"),
+        "A-2": ("PAL-2", "A-2", "PAL-1"),
+        "A-3": ("A-3", "PAL-2"),
+        "A-4": ("A-4",),
+    }
+    counted = {"A-1": "PAL-1", "A-2": "PAL-2", "A-3": "", "A-4": "PAL-4"}
+    with SqliteStore(tmp_path) as inventory:
+        inventory.plan(PlannedLocation(place, "A1") for place in shown)
+        for place, texts in shown.items():
+            kept = inventory.keep_evidence(picture_of(*texts))
+            told = (code(counted[place]),) if counted[place] else ()
+            state = LocationState.READ if told else LocationState.EMPTY
+            inventory.commit(look(place, state, *told, run="monday", evidence=kept))
+    ended = flightd("study", tmp_path, "--with", "codes", "--json", "--workers", 1)
+    (log,) = json.loads(ended.stdout)["logs"]
+    figures = log["studies"]["codes"]["figures"]
+    assert figures["same"] == 2
+    assert (figures["otherwise"], figures["newly_read"]) == ([], 0)
+    assert figures["lost"] == ["A-4"], "its own label alone is no goods"
 
 
 @pytest.mark.parametrize("work", [dies_once, always_dies])
