@@ -80,5 +80,5 @@ async def said(request: Request, kind: type[_T], what: str, most: int = MAX_PAGE
     """What the request says in its body.  InputError for one that is not JSON, not `what`, longer than `most`
     bytes, or breaks off."""
     if not is_json(request):
-        raise InputError(f"{what} is JSON")
+        raise InputError(f"{what} is JSON", remedy="send it as Content-Type: application/json")
     return decoded(await json_body(request, what, most), kind, what)

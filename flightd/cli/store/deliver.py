@@ -13,6 +13,7 @@ import typer
 
 from flightd.cli.options import AsJson
 from flightd.cli.store.options import Pictures, StoreOrStation, Unless, between_flights
+from flightd.core.errors import InputError
 
 
 def register(app: typer.Typer) -> None:
@@ -61,6 +62,8 @@ def deliver(
     from flightd.ground.ground_store.deliver_folder import deliver_paths
     from flightd.ground.ground_store.sender import Delivered
 
+    if not site.isprintable():
+        raise InputError("is no name", key=f"--site {site!r}", remedy="give one of a line, without tabs")
     done, stopped = Delivered(), ""
     try:
         with between_flights(store, evidence, unless) as into:

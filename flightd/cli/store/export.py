@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from flightd.cli.options import AsJson
-from flightd.cli.store.options import Store, opened
+from flightd.cli.store.options import Store, opened_to_read
 
 
 def register(app: typer.Typer) -> None:
@@ -30,7 +30,7 @@ def export(
       flightd store export --store counts.db --out tables
       duckdb -c "SELECT run, count(*) FROM 'tables/observations.parquet' GROUP BY run"
     """
-    with opened(store, None) as found:
+    with opened_to_read(store, None) as found:
         written = found.export(site, out)
     if as_json:
         print(json.dumps({"folder": str(out), "rows": written}))

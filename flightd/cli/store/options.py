@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
+from flightd.core.errors import InputError
+
 if TYPE_CHECKING:
     from flightd.ground.ground_store.sender import Target
     from flightd.ground.ground_store.store import GroundStore
@@ -19,7 +21,7 @@ Store: TypeAlias = Annotated[
     typer.Option(
         metavar="FILE|URL",
         envvar="FLIGHTD_STORE",
-        help="The store: a file, made where it is not there, or postgresql://USER@HOST/DATABASE.",
+        help="The store: a file, or postgresql://USER@HOST/DATABASE.",
         show_default=False,
     ),
 ]
@@ -81,6 +83,14 @@ def target(store: str, evidence: str | None) -> Iterator[Target]:
         return
     with opened(store, evidence) as found:
         yield found
+
+
+def opened_to_read(store: str, evidence: str | None) -> GroundStore:
+    """As `opened`, but a file that is not there is a mistyped one, and none is made."""
+    if store and "://" not in store and not Path(store).exists():
+        remedy = "give that of one, or deliver into it"
+        raise InputError("there is no such file", key=f"--store {store}", remedy=remedy)
+    return opened(store, evidence)
 
 
 def opened(store: str, evidence: str | None) -> GroundStore:

@@ -7,7 +7,7 @@ import json
 import typer
 
 from flightd.cli.options import AsJson
-from flightd.cli.store.options import Pictures, Store, opened
+from flightd.cli.store.options import Pictures, Store, opened_to_read
 
 
 def register(app: typer.Typer) -> None:
@@ -24,7 +24,7 @@ def show(store: Store, evidence: Pictures = None, as_json: AsJson = False) -> No
     """
     from flightd.core.utc_time import utc_text
 
-    with opened(store, evidence) as found:
+    with opened_to_read(store, evidence) as found:
         counts = found.counts()
         sites = [site["site"] for site in found.sites()]
         runs = {site: found.runs(site, limit=5) for site in sites}

@@ -54,7 +54,7 @@ def _deliver_path(path: Path, site: str, source: str, target: Target, done: Deli
             sites[name] = site or stores.site_name(name)
             deliver_inventory(folder, sites[name], source, target, done)
     with _going_on(path, done):
-        deliver_flights(logs, site, source, target, done)
+        deliver_flights(logs, site, source, target, done, all_expected=only is not None)
     if found.cut and only is None:
         done.failures.append(f"{path}: {CUT}; deliver the folders in it one by one")
     if only is None and (root / DECISIONS).is_file():

@@ -185,16 +185,28 @@ def missing_pictures(names: Iterable[str], target: Target) -> Iterator[str]:
 
 
 def deliver_flights(
-    logs: Sequence[FoundLog], site: str, source: str, target: Target, done: Delivered
+    logs: Sequence[FoundLog],
+    site: str,
+    source: str,
+    target: Target,
+    done: Delivered,
+    *,
+    all_expected: bool = False,
 ) -> bool:
     """Every flight that is over; each is of its own log's site, else of `site`.  Whether all are: one whose
-    log was written just now may be cut off there, and that log never changes again."""
+    log was written just now may be cut off there, and that log never changes again.
+
+    Where `all_expected`, a log without a flight to deliver is among the `failures`; among the many of a
+    folder it is nothing special, of a daemon that was ended before it flew."""
     by_site: dict[str, list[SentFlight]] = {}
     all_over = True
     for log, row in zip(logs, read_rows(tuple(logs)), strict=True):
         all_over &= not row.running
         if row.outcome and not row.running and (row.site or site):
             by_site.setdefault(row.site or site, []).append(_flight(log, row))
+        elif all_expected:
+            why = row.trouble or "nothing says of which site the flight is; deliver it with --site NAME"
+            done.failures.append(f"{log.root / log.relative}: {why}")
     for name, flights in by_site.items():
         for part in _parts(flights):
             target.take(Batch(name, source, flights=tuple(part)))

@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import random
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -246,6 +247,40 @@ def test_an_inventory_of_no_known_site_is_refused(store: GroundStore, tmp_path: 
     assert store.counts()["looks"] == 0
     deliver_paths([tmp_path / "monday"], SITE, "station", store, Delivered())
     assert store.counts()["looks"] == 10
+
+
+def test_a_log_that_is_named_and_holds_no_flight_is_told(
+    store: GroundStore, tmp_path: Path, recorded_flight: Path
+) -> None:
+    empty, broken, flown = (tmp_path / f"{name}.mcap" for name in ("empty", "broken", "flown"))
+    empty.write_bytes(b"")
+    broken.write_bytes(b"no log at all, but long enough " * 50)
+    shutil.copyfile(recorded_flight / "flight.mcap", flown)
+    in_a_folder, named = Delivered(), Delivered()
+    deliver_paths([tmp_path], "", "drone", store, in_a_folder)
+    assert (in_a_folder.flights, in_a_folder.failures) == (1, [])
+    deliver_paths([empty, broken, flown], "", "drone", store, named)
+    assert named.flights == 1
+    assert [line.partition(": ")[0] for line in named.failures] == [str(empty), str(broken)]
+    assert "nothing was recorded" in named.failures[0]
+
+
+def test_a_store_that_is_only_read_is_not_made_by_a_mistyped_name(flightd: Command, tmp_path: Path) -> None:
+    file = tmp_path / "conuts.db"
+    told = f"flightd: --store {file}: there is no such file; give that of one, or deliver into it\n"
+    for words in (("show",), ("export", "--out", tmp_path / "tables")):
+        ended = flightd("store", *words, "--store", file)
+        assert (ended.returncode, ended.stdout, ended.stderr) == (2, "", told)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_site_is_a_name_of_one_line(flightd: Command, tmp_path: Path) -> None:
+    counted_store(tmp_path / "monday")
+    file = tmp_path / "counts.db"
+    ended = flightd("store", "deliver", tmp_path / "monday", "--store", file, "--site", "hall\n3")
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("flightd: --site 'hall\\n3': is no name; ")
+    assert not file.exists()
 
 
 def test_an_inventory_says_itself_of_which_site_it_is(store: GroundStore, tmp_path: Path) -> None:
