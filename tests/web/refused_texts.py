@@ -78,6 +78,7 @@ NO_PAGE = {
 STAYS_ENGLISH = {
     "{}, to hold at the last": "of a plan that no page asks for: a fleet's",
     "a plan that waits at its end has nodes": "told to programs: no page asks for it",
+    "send it as Content-Type: application/json": "told to programs: a page says so",
     "the counts of a goto are of its own node, here {}": "told to programs: no page asks for it",
     "only goto and a plan over nodes end by waiting": "told to programs: no page asks for it",
     "only a goto that does not wait lands on another pad": "told to programs: no page asks for it",

@@ -76,7 +76,26 @@ UNKNOWN = (
     "there is nothing in it: look at page 7; and then go on (as before)",
 )
 """What nobody says: no text's German may be taken for its own."""
-READ = """async ({ examples, unknown }) => {
+EVENTS = {
+    "arming -> take_off: armed": "Scharfstellen → Abheben: scharf",
+    "aisle A, level 1: 0.80 m/s at 0.90 m, 1.20 m from the shelf, 3.6 whole views at 4 frames a second,"
+    " 2.50 px per module, a blur of 0.53 in 2 ms; no faster because of mission.speed_mps": (
+        "Gang A, Ebene 1: 0,80 m/s auf 0,90 m, 1,20 m vom Regal, 3,6 Mal ganz im Bild bei 4 Bildern in der"
+        " Sekunde, 2,50 px je Modul, Unschärfe 0,53 in 2 ms; nicht schneller wegen: mission.speed_mps"
+    ),
+    "camera udp://127.0.0.1:5600: a frame came out of order (13 refused so far)": (
+        "Kamera udp://127.0.0.1:5600: ein Bild kam in falscher Reihenfolge (bisher 13 verworfen)"
+    ),
+    "camera device:/dev/video0: a frame was exposed 1.2 s ago (1 refused so far)": (
+        "Kamera device:/dev/video0: ein Bild wurde vor 1,2 s belichtet (bisher 1 verworfen)"
+    ),
+    "a simulation on site hall-3": "eine Simulation in der Halle hall-3",
+    "face light": "Licht am Regal",
+    "ground link": "Bodenverbindung",
+    "swept": "vorbeigeflogen",
+}
+"""What a drone tells on a flight, by what is read of it."""
+READ = """async ({ examples, unknown, events }) => {
   const { TEXTS, REPORTED, readerOf } = await import("/static/app/german/catalogue.js");
   const read = readerOf(TEXTS, REPORTED, (value, digits) => value.toFixed(digits).replace(".", ","));
   const told = (text) => read(text).map((part) => part.text).join("");
@@ -90,6 +109,7 @@ READ = """async ({ examples, unknown }) => {
     english: examples.filter((text) => read(text).some((part) => part.foreign)),
     others: Object.entries(REPORTED).filter((entry) => !own(entry)).map(([english]) => english),
     taken: unknown.filter((text) => !read(text).some((part) => part.foreign)),
+    events: Object.fromEntries(events.map((text) => [text, told(text)])),
   };
 }"""
 
@@ -137,8 +157,9 @@ def test_what_is_refused_has_its_german_and_no_text_another_ones(browser: Browse
     assert len(examples) > 600
     examples += value_mistakes()
     with opened(browser, f"{url}/guide", NARROW) as page:
-        found = page.evaluate(READ, {"examples": examples, "unknown": UNKNOWN})
-    assert found == {"english": [], "others": [], "taken": []}
+        asked = {"examples": examples, "unknown": UNKNOWN, "events": list(EVENTS)}
+        found = page.evaluate(READ, asked)
+    assert found == {"english": [], "others": [], "taken": [], "events": EVENTS}
 
 
 def test_whose_browser_is_german_reads_german_numbers_and_dates(browser: Browser, url: str) -> None:

@@ -1,4 +1,4 @@
-// Why an autopilot is not fit to fly, or refuses: its parameters, and what it says.
+// Why an autopilot is not fit to fly, or refuses.
 export default {
   "the autopilot is {found}, the configuration says {configured}": "der Autopilot ist {found}, die Konfiguration sagt {configured}",
   "the vehicle's system id is {found}, the configuration says {configured}": "die System-ID des Fluggeräts ist {found}, die Konfiguration sagt {configured}",

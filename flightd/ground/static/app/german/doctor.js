@@ -1,4 +1,3 @@
-// The page Doctor: checks, settings, versions, log.
 export default {
   "The drone checks them as a whole …": "Die Drohne prüft sie als Ganzes …",
   "The drone has written them.": "Die Drohne hat sie geschrieben.",

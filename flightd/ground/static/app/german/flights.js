@@ -1,4 +1,3 @@
-// The page Flights: list, playback, comparison.
 export default {
   "The floor in the middle of the flight": "Der Boden in der Mitte des Flugs",
   "first": "erster",

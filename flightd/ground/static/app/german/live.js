@@ -1,4 +1,3 @@
-// The page Live: map, cameras, orders, figures, events.
 export default {
   "Only looking on": "Nur zusehen",
   "The key of this station has the role {role}; orders need an operator's.": "Der Schlüssel dieser Station hat die Rolle {role}; Befehle brauchen die eines Bedieners.",

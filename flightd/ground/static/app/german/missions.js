@@ -1,4 +1,3 @@
-// The page Missions: choosing, keeping and flying.
 export default {
   "Aisles, levels and order": "Gänge, Ebenen und Reihenfolge",
   "Every node": "Alle Knoten",

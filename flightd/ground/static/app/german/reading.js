@@ -1,11 +1,11 @@
-// How what drone and station say in English is read in German: as a whole, by a pattern with its figures in it, or
-// as they put it together, FILE: KEY: WHAT; REMEDY, each part for itself.
+// Reads in German what drone and station say in English: as a whole, by a pattern with its figures in it, or in its
+// parts, FILE: KEY: WHAT; REMEDY.
 const MOST_KEPT = 500;
 const MOST_PARTS = 8; // of a text that is taken to pieces
 const PLACE = /\{(\w+)\}/;
 const NAME = /^(?:\S*|'.*'|".*"|\S+ \(\S*\)\S*)$/s; // one word, quoted, or a key as `pad[0] (home).node`
 const LIST = /^\S+(?:, \S+)+$/;
-// Fields that are shown as they are, even where such a word has its German.
+// Fields that are shown as they are.
 const VERBATIM = new Set(["columns", "drone", "file", "folder", "home", "key", "known", "name", "node", "pad", "person", "site", "url"]);
 
 // A function from such a text to its parts: {text, foreign: it stays English}.  `texts`: {english: german}, with
@@ -54,7 +54,7 @@ export function readerOf(texts, reported, decimal) {
     if (count) yield* onlyKnown([{ text: count }, ...read(counted)]);
   }
 
-  const isName = (text) => NAME.test(text) || LIST.test(text) || !/[a-z]{2}/.test(text);
+  const isName = (text) => NAME.test(text) || LIST.test(text) || !/[a-z]{2}|: /.test(text);
   const filled = (name, text) => (VERBATIM.has(name) && isName(text) ? [{ text }] : figure(text));
 
   // What stands in such a text: a number, a name, or another text.
@@ -72,7 +72,7 @@ export function readerOf(texts, reported, decimal) {
 
 const onlyKnown = (parts) => (parts.some(({ foreign }) => foreign) ? [] : [parts]);
 
-// Of the ways to read a text the first that leaves nothing English, else the one that leaves least.
+// The first way that leaves nothing English, else the one that leaves least.
 function leastForeign(ways) {
   let best;
   let least = Infinity;

@@ -1,5 +1,4 @@
-// What station and drone refuse, why, and what to do about it; what the check of a map finds.  Matched as what is
-// reported; a text of FILE: KEY: WHAT; REMEDY stands here in its parts.
+// What station and drone refuse, in the parts of FILE: KEY: WHAT; REMEDY; what the check of a map finds.
 export default {
   // who may do it
   "too many tries": "zu viele Versuche",

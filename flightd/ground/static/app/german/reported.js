@@ -1,5 +1,4 @@
-// What drone, station and pages report: shown where it arrives, and matched against these with its figures in
-// it.  What is not here stays English.
+// What drone, station and pages report, with its figures in it.  What is not here stays English.
 export default {
   "{node} and {n} more": "{node} und {n} weitere",
   "camera delay": "Verzögerung der Kamera",
@@ -47,11 +46,12 @@ export default {
   "green": "grün",
   "black": "schwarz",
   "orange": "orange",
-  // phases, as events name them
+  // phases
   "preflight": "am Boden",
   "recover": "Übernahme",
   "arming": "Scharfstellen",
   "take off": "Abheben",
+  "take_off": "Abheben",
   "acquire": "Liniensuche",
   "follow": "Linienflug",
   "hover": "Schweben",
@@ -76,6 +76,17 @@ export default {
   "recount": "Nachzählung",
   "unfit": "nicht flugbereit",
   "failure": "Ausfall",
+  "battery": "Akku",
+  "contradiction": "Widerspruch",
+  "ground link": "Bodenverbindung",
+  "sweep": "Vorbeiflug",
+  "swept": "vorbeigeflogen",
+  "face light": "Licht am Regal",
+  "view missed": "Blick verfehlt",
+  "camera {url}: {what} ({n} refused so far)": "Kamera {url}: {what} (bisher {n} verworfen)",
+  "a frame came out of order": "ein Bild kam in falscher Reihenfolge",
+  "a frame was exposed {age} s ago": "ein Bild wurde vor {age} s belichtet",
+  "a simulation on site {site}": "eine Simulation in der Halle {site}",
   "landing": "Landung",
   "not counted": "nicht gezählt",
   "restart": "Neustart",

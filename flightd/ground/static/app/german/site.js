@@ -1,4 +1,3 @@
-// The page Site: the hall's map in the editor.
 export default {
   "Field of view across": "Bildwinkel quer",
   "Picture's width": "Breite des Bildes",

@@ -1,4 +1,3 @@
-// The page Stock: racks, places, decisions, the expected stock.
 export default {
   "Noted.": "Notiert.",
   "Decision": "Entscheidung",

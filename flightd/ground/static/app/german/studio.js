@@ -1,4 +1,3 @@
-// The page Studio: picture sets, marks, learning, profiles, lens.
 export default {
   "From a flight": "Aus einem Flug",
   "Files": "Dateien",
