@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import socket
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,12 @@ from tests.command import Command
 from tests.rigs.extras import of_extra
 
 _KEY = "--address ray://head:10001"
+
+
+def test_the_extra_brings_what_speaks_to_a_cluster_at_an_address() -> None:
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
+    (ray,) = project["optional-dependencies"]["ray"]
+    assert ray.startswith("ray[client]"), "without it Ray refuses every ray://HOST:PORT"
 
 
 @pytest.mark.parametrize(
