@@ -17,6 +17,7 @@ from flightd.core.outlook import Outlook
 from flightd.core.planned_flight import PlannedFlight, StandingPlan
 from flightd.core.types import Command, CommandKind, Demand, Event, EventLevel, GridPose, Phase
 from flightd.mission.battery.swap import BatterySwap
+from flightd.mission.counted_way import CountedWay
 from flightd.mission.event_log import EventLog
 from flightd.mission.flight.leg_direction import LegDirection, leads_along_x
 from flightd.mission.flight.phase_progress import PhaseProgress
@@ -86,6 +87,7 @@ class Mission:
         self._route = Itinerary(site, plan, policy, self._events)
         self._route.wanted = scanner.wants
         self._scan = ShelfScan(site, scanner)
+        self._counting = CountedWay(self._route, self._scan)
         self._progress = PhaseProgress(config, self._route, self._scan, scanner)
         self._monitor = HazardMonitor(config)
         self._relocator = Relocator(config.mission, site.ceiling_m - CEILING_MARGIN_M, overhead_m)
@@ -416,9 +418,10 @@ class Mission:
                 self._clearance.withdraw()
                 self._steering.take_off(s.height_m)
             case Phase.ACQUIRE if trigger is Trigger.POSITION_SURE:
-                self._rejoin(s)
+                self._counting.rejoin(s, returning=self.state.returning)
             case Phase.RELOCATE:
-                self._relocate(s)
+                self._relocator.begin()
+                self._reporter.doubt(s)
             case Phase.LAND:
                 self._steering.land(by_itself=trigger is Trigger.TIMED_OUT)
             case Phase.SWAP:
@@ -444,51 +447,16 @@ class Mission:
     def _go_on(self, s: MissionInputs) -> None:
         """To the next stop, which is the way back where the battery does not reach another one."""
         if not self.state.returning:
-            self._lead_sweep(s.now_ns)
-            self._count_again(s.now_ns)
+            self._counting.lead_on(s.now_ns, self.goal)
             self._turn_back(self._charging.look_ahead(s.now_ns))
-        self._route.advance(s.pose, either_side=self._scan.is_scanned(self.goal))
-
-    def _lead_sweep(self, now_ns: int) -> None:
-        """Fly past the shelves that lie ahead, or stop before what the legs past them left open."""
-        if self._scan.legs:
-            self._route.sweep(now_ns, self._scan.begin_sweep())
-        elif self.goal.sweep is not None and self.goal.sweep.last:
-            self._scan.end_sweep(now_ns)
-            self._route.visit_undecided(now_ns)
-
-    def _count_again(self, now_ns: int) -> None:
-        """Nodes whose count was taken back are visited again, or left for the next battery."""
-        if self._scan.sweeping:
-            return
-        due = self._scan.take_due()
-        if self.state.returning:
-            self._route.recount(now_ns, due, returning=True)
-        else:
-            self._route.recount_next(now_ns, due)
+        self._counting.advance(s, self.goal)
 
     def _pass_by(self, s: MissionInputs) -> None:
         """What is flown past is decided, and its nodes are visited."""
-        self._scan.step(s, self.goal)
-        if self.state.returning:
-            self._count_again(s.now_ns)
+        self._counting.step(s, self.goal, returning=self.state.returning)
         known = s.localised and s.is_sure(self._params)
         if self.phase is Phase.FOLLOW and known and s.pose is not None and not self.state.returning:
             self._route.note_passed(s.now_ns, s.pose)
-
-    def _relocate(self, s: MissionInputs) -> None:
-        """Begin to look for the position."""
-        self._relocator.begin()
-        places = ", ".join(f"{node} {share:.0%}" for node, share in s.rivals[:5])
-        if places:
-            self._events.report(s.now_ns, EventLevel.WARNING, "position", f"doubted, it may be {places}")
-
-    def _rejoin(self, s: MissionInputs) -> None:
-        """Go on from where the drone turned out to be."""
-        if s.pose is None:
-            return
-        self._route.recount(s.now_ns, self._scan.take_due(), returning=self.state.returning)
-        self._route.rejoin(s.now_ns, s.pose)
 
     def _correct(self, s: MissionInputs) -> None:
         """The drone is not where it was believed to be: what was held in metres moves along."""

@@ -47,6 +47,12 @@ class PhaseReporter:
         text = f"{before.phase.value} -> {after.phase.value}: {self.reason}"
         self._events.report(s.now_ns, level, "phase", text)
 
+    def doubt(self, s: MissionInputs) -> None:
+        """It looks for its position: where it may be."""
+        places = ", ".join(f"{node} {share:.0%}" for node, share in s.rivals[:5])
+        if places:
+            self._events.report(s.now_ns, EventLevel.WARNING, "position", f"doubted, it may be {places}")
+
     def halt(self, *, paused: bool) -> None:
         """It stands still in the air; an operator wants that, too, if `paused`."""
         if self._cause is not None:

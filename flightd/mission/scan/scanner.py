@@ -23,16 +23,16 @@ from flightd.mission.reasons import NothingRead
 from flightd.mission.scan.code_assignment import Assigner, FrontSight, ShelfLook, Sighting
 from flightd.mission.scan.code_owners import CodeOwners
 from flightd.mission.scan.code_votes import SeenRead
-from flightd.mission.scan.face_light import USUAL, Face, FaceLight, LegLight
 from flightd.mission.scan.label_checks import LabelChecks
+from flightd.mission.scan.leg_exposure import LegExposure
 from flightd.mission.scan.node_scan import ScanTask
 from flightd.mission.scan.passing_time import PassingTime
 from flightd.mission.scan.pending_findings import PendingFindings
-from flightd.mission.scan.sweep_planner import JudgedLane, SweepPlanner
+from flightd.mission.scan.sweep_planner import SweepPlanner
 from flightd.mission.scan.sweep_speed import SweepOptics
 from flightd.mission.scan.sweep_task import SweepTask
 from flightd.mission.scan.sweep_votes import Undecided
-from flightd.mission.scan.told_sweeps import told
+from flightd.mission.scan.told_sweeps import told_runs
 from flightd.mission.scan.views import View, ViewPlanner, views_s
 from flightd.site.site import Site
 
@@ -64,8 +64,7 @@ class Scanner:
             self._sweeps = SweepPlanner(site, self._planner, self._assigner, optics)
             self._passing_time = PassingTime(self._sweeps, self._node_of)
         self._sweep: SweepTask | None = None
-        self._light = FaceLight(params.expert.darker, params.expert.brighter, params.sweep.most_gain)
-        self._shot = USUAL
+        self._exposure = LegExposure(site, params)
         self._swept: set[str] = set()
         self._passed: dict[str, tuple[SeenRead, ...]] = {}
         self._owners = CodeOwners()
@@ -111,7 +110,7 @@ class Scanner:
     def exposure(self) -> tuple[float, float]:
         """What the front camera's pictures are wanted with, as parts of its usual exposure and gain."""
         if self._passing is not None:
-            return self._shot.exposure, self._shot.gain
+            return self._exposure.taken_with
         return self.view.exposure if self.view is not None else 1.0, 1.0
 
     @property
@@ -206,14 +205,13 @@ class Scanner:
         """The front camera has shown that it is exposed as it is."""
         if self._relights:
             self._relights = False
-            self._light.fix()
+            self._exposure.fix()
             text = "the front camera does not support exposure control: what is lit wrongly stays unreadable"
             self._events.append(Event(now_ns, EventLevel.WARNING, "exposure_fixed", text))
 
     def _lit(self, view: View) -> View:
         """With the exposure that was right when its rack front was flown past."""
-        part = self._light.part({self._face(code) for code in view.locations})
-        return replace(view, exposure=part)
+        return replace(view, exposure=self._exposure.of_places(view.locations))
 
     def leave(self) -> None:
         """The node is left; what was not decided there stays to count."""
@@ -277,13 +275,7 @@ class Scanner:
         as far as the choice takes it, and why where it is not; empty where nothing ever is."""
         if self._sweeps is None:
             return ()
-        lanes: list[JudgedLane] = []
-        before: frozenset[str] = frozenset()
-        for run in runs:
-            codes = frozenset(code for node in run for code in self.places_at(node, choice)) - before
-            lanes += self._sweeps.judged(run, codes, 0.0, 0.0)
-            before |= codes
-        return told(lanes)
+        return told_runs(self._sweeps, runs, lambda node: self.places_at(node, choice))
 
     def legs(self, run: Sequence[str], here: str, yaw_rad: float, height_m: float) -> tuple[SweepLeg, ...]:
         """The legs past what is left to count at the nodes `run` of an aisle, for a drone over its node
@@ -319,15 +311,15 @@ class Scanner:
     @property
     def passing_mps(self) -> float:
         """No faster may be flown past a shelf for want of light; infinite where nothing is."""
-        return self._shot.speed_mps if self._passing is not None else math.inf
+        return self._exposure.most_mps if self._passing is not None else math.inf
 
     def step_sweep(self, now_ns: int, leg: SweepLeg | None, flown_mps: float) -> None:
         """Decide what has been flown past by now, and how `leg` is to be taken at the speed `flown_mps`."""
-        if self._sweep is not None:
+        if self._sweep is not None and self._sweeps is not None:
             if leg is not None:
-                self._shot = self._light.shot(_faces(leg), self._leg_light(leg), flown_mps)
+                self._exposure.aim(leg, self._sweeps.sharp_mps, flown_mps)
                 self._sweep.fly(now_ns, leg)
-            if not self._light.follows:
+            if not self._exposure.follows:
                 self._fix_exposure(now_ns)
             self._sweep.step(now_ns)
             self._gather_sweep()
@@ -342,26 +334,8 @@ class Scanner:
         left = ", ".join(f"{count} {reason}" for reason, count in sorted(why.items()))
         text = f"{why.total()} places to stop before" + (f": {left}" if left else "")
         self._events.append(Event(now_ns, EventLevel.INFO, "swept", text))
-        for (aisle, side, level), part in self._light.drain_changed():
-            text = f"aisle {aisle} {side}, level {level}: taken with {part:.2f} times the usual light"
-            self._events.append(Event(now_ns, EventLevel.INFO, "face_light", text))
+        self._events += self._exposure.drain_events(now_ns)
         self._sweep = None
-
-    def _leg_light(self, leg: SweepLeg) -> LegLight:
-        assert self._sweeps is not None
-        return LegLight(leg.speed_mps, leg.exposure, self._sweeps.sharp_mps)
-
-    def _whites(self, leg: SweepLeg, codes: CodeSet) -> dict[Face, float | None]:
-        """What white paper came out as, by front: by the labels there, else by the whole picture."""
-        whites: dict[Face, float | None] = dict.fromkeys(_faces(leg), codes.white)
-        for place in codes.places:
-            if place.white is not None and (face := self._face(place.location)) in whites:
-                whites[face] = place.white
-        return whites
-
-    def _face(self, code: str) -> Face:
-        place = self._site.locations[code]
-        return place.aisle, place.side, place.level
 
     # What pictures bring
 
@@ -402,8 +376,7 @@ class Scanner:
             leg = passing.leg_at(pose)
             if leg is None:
                 return
-            taken = codes.exposure, codes.gain
-            self._light.take(self._whites(leg, codes), self._shot, taken, leg.exposure)
+            self._exposure.take(leg, codes)
             look = self._assigner.look(codes, pose, (leg.aisle, leg.side))
             agreeing = self._proven(look, f"aisle {leg.aisle}")
             if agreeing is not None:
@@ -521,7 +494,3 @@ class Scanner:
     def _chosen(self, codes: Iterable[str], choice: CountChoice) -> frozenset[str]:
         places = map(self._site.locations.__getitem__, codes)
         return frozenset(at.code for at in places if choice.takes(at.node, at.side, at.level))
-
-
-def _faces(leg: SweepLeg) -> list[Face]:
-    return [(leg.aisle, leg.side, level) for level in leg.levels]

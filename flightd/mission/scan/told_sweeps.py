@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from flightd.core.planned_flight import PlannedSweep
 from flightd.mission.scan.legibility import LEGIBILITY_WORDS
-from flightd.mission.scan.sweep_planner import JudgedLane, Lane
+from flightd.mission.scan.sweep_planner import JudgedLane, Lane, SweepPlanner
 from flightd.mission.scan.sweep_speed import Limit, StopCause
 from flightd.site.coverage import MIN_PX_PER_MODULE, Legibility, too_small
 
@@ -16,6 +16,19 @@ _LIMIT_WORDS = {
     Limit.CRUISE: "mission.speed_mps",
     Limit.CONFIGURED: "scan.sweep.speed_mps",
 }
+
+
+def told_runs(
+    planner: SweepPlanner, runs: Iterable[Sequence[str]], places_at: Callable[[str], Iterable[str]]
+) -> tuple[PlannedSweep, ...]:
+    """The lanes past what hangs at the nodes of `runs`; what hangs at several is told with the first."""
+    lanes: list[JudgedLane] = []
+    before: frozenset[str] = frozenset()
+    for run in runs:
+        codes = frozenset(code for node in run for code in places_at(node)) - before
+        lanes += planner.judged(run, codes, 0.0, 0.0)
+        before |= codes
+    return told(lanes)
 
 
 def told(lanes: Iterable[JudgedLane]) -> tuple[PlannedSweep, ...]:
