@@ -7,6 +7,7 @@ disk and over SFTP.  A bucket of S3 renames by copying, but shows an object once
 from __future__ import annotations
 
 import os
+import secrets
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -96,10 +97,11 @@ class SharedFolder:
 
         return self._done(f"{name} cannot be read", content)
 
-    def write(self, name: str, data: bytes) -> None:
-        """All of it under its name, or none; on the disk, where that is here."""
-        path = PurePosixPath(name)
-        beside = self._at(str(path.with_name(f".{path.name}.tmp")))
+    def write(self, name: str, data: bytes, *, alone: bool = True) -> None:
+        """All of it under its name, or none; on the disk, where that is here.  What a cut leaves beside it
+        the next try writes anew; where others may write the same file now, not `alone`, it stays."""
+        path, own = PurePosixPath(name), "" if alone else f".{secrets.token_hex(4)}"
+        beside = self._at(str(path.with_name(f".{path.name}{own}.tmp")))
 
         def written() -> None:
             if self._is_bucket:

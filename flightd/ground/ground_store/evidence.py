@@ -61,7 +61,7 @@ class SharedEvidence:
     def keep(self, jpeg: bytes) -> str:
         name = evidence_name(jpeg)
         if not self.has(name):
-            self._folder.write(_at(name), jpeg)
+            self._folder.write(_at(name), jpeg, alone=False)
         return name
 
     def picture(self, name: str) -> bytes:
