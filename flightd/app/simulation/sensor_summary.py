@@ -15,9 +15,12 @@ def sensor_summary(simulation: Simulation, seen: SensorEstimate) -> dict[str, An
     """The summary's part on the sensors, of which the lines said `seen` last: `estimated`, `estimated_sigma`
     and `drawn`, the same keys each.
 
-    The camera's delay is whole, configuration included; the mount's angles and the focal length are beyond
-    the configured ones; the height is by how much the told one is too small for good, which no world draws;
-    the tilt bias is by how much the told roll and pitch are too large, as two angles and their hypotenuse.
+    The camera's delay is whole, configuration included; `delay_to_attitude_s` is that beside the told
+    attitude, which is what the lines tell: by half of what the ways there and back differ, all attitudes are
+    stamped wrong once clocks have been compared (Mills, RFC 5905).  The mount's angles and the focal length
+    are beyond the configured ones; the height is by how much the told one is too small for good, which no
+    world draws; the tilt bias is by how much the told roll and pitch are too large, as two angles and their
+    hypotenuse.
     None for what nobody estimates, and before any line was seen."""
     return {
         "estimated": _estimated(seen, simulation.config.camera.latency_s),
@@ -29,6 +32,7 @@ def sensor_summary(simulation: Simulation, seen: SensorEstimate) -> dict[str, An
 def _estimated(seen: SensorEstimate, latency_s: float) -> Known:
     return _rounded(
         camera_delay_s=latency_s - seen.delay_s,
+        delay_to_attitude_s=latency_s - seen.delay_s,
         mount_roll_deg=math.degrees(seen.mount_roll_rad),
         mount_pitch_deg=math.degrees(seen.mount_pitch_rad),
         mount_yaw_deg=math.degrees(seen.mount_yaw_rad),
@@ -41,6 +45,7 @@ def _sigma(seen: SensorEstimate) -> Known:
     mount_deg, tilt_deg = math.degrees(seen.mount_sigma_rad), math.degrees(seen.tilt_sigma_rad)
     known = _rounded(
         camera_delay_s=seen.delay_sigma_s,
+        delay_to_attitude_s=seen.delay_sigma_s,
         mount_roll_deg=mount_deg,
         mount_pitch_deg=mount_deg,
         mount_yaw_deg=math.degrees(seen.mount_yaw_sigma_rad),
@@ -53,8 +58,11 @@ def _sigma(seen: SensorEstimate) -> Known:
 def _drawn(simulation: Simulation) -> Known:
     unknowns, configured = simulation.unknowns, simulation.scenario.camera.camera()
     roll_rad, pitch_rad = unknowns.tilt_bias_rad or (math.nan, math.nan)
+    delay_s = unknowns.camera(configured).capture_delay_s
+    down, up = unknowns.radio(simulation.scenario.vehicle.radio())
     return _rounded(
-        camera_delay_s=unknowns.camera(configured).capture_delay_s,
+        camera_delay_s=delay_s,
+        delay_to_attitude_s=delay_s - 0.5 * (down.delay_s - up.delay_s),
         mount_roll_deg=math.degrees(unknowns.mount_roll_rad),
         mount_pitch_deg=math.degrees(unknowns.mount_pitch_rad),
         mount_yaw_deg=math.degrees(unknowns.mount_yaw_rad),
@@ -66,6 +74,7 @@ def _drawn(simulation: Simulation) -> Known:
 def _rounded(
     *,
     camera_delay_s: float,
+    delay_to_attitude_s: float,
     mount_roll_deg: float,
     mount_pitch_deg: float,
     mount_yaw_deg: float,
@@ -74,6 +83,7 @@ def _rounded(
 ) -> Known:
     values = {
         "camera_delay_s": camera_delay_s,
+        "delay_to_attitude_s": delay_to_attitude_s,
         "mount_roll_deg": mount_roll_deg,
         "mount_pitch_deg": mount_pitch_deg,
         "mount_yaw_deg": mount_yaw_deg,

@@ -222,8 +222,9 @@ class IdealFlight:
                 if self._now_ns % ATTITUDE_NS == 0 and not self.faults.silent:
                     vehicle.samples.append(self._attitude())
             else:
-                self.link.step(self._now_ns, setpoints.newest, armed=self._armed)
+                self.link.command(self._now_ns, setpoints.newest)
                 self._step(self.link.obeyed if setpoints.newest is not None else None)
+                self.link.tell(self._now_ns, armed=self._armed)
                 vehicle.samples += self.link.attitudes()
             if self._now_ns >= frame_ns:
                 frame_ns += self.frame_ns

@@ -49,7 +49,7 @@ class Line(Generic[ItemT]):
 
 
 class IdealLink:
-    """Telemetry down and setpoints up; call `step` at each step of the world."""
+    """Setpoints up and telemetry down: in each step of the world `command` before it moves, `tell` after."""
 
     def __init__(
         self, unknowns: Unknowns, airframe: Airframe, sensors: Sensors, seed: int, now_ns: int
@@ -68,14 +68,17 @@ class IdealLink:
         self.obeyed: AttitudeSetpoint | None = None
         """The setpoint that the autopilot has; None before the first."""
 
-    def step(self, now_ns: int, setpoint: AttitudeSetpoint | None, *, armed: bool) -> None:
-        """Carry on what is under way; `setpoint` is the newest that the daemon has made."""
+    def command(self, now_ns: int, setpoint: AttitudeSetpoint | None) -> None:
+        """Carry on what goes up; `setpoint` is the newest that the daemon has made."""
         self._talk(now_ns, setpoint)
         for message in self._up.arrived(now_ns):
             if isinstance(message, AttitudeSetpoint):
                 self.obeyed = message
             else:
                 self._down.put(now_ns, ("answer", message, self._theirs_ns(now_ns)))
+
+    def tell(self, now_ns: int, *, armed: bool) -> None:
+        """Carry on what comes down; the airframe and its sensors are where they are now."""
         self._tell(now_ns, armed=armed)
         for kind, message, stamp_ns in self._down.arrived(now_ns):
             if kind == "answer":

@@ -36,7 +36,7 @@ def test_a_delay_that_is_configured_wrong_is_found(unknowns: Unknowns) -> None:
     result = flown(unknowns)
     assert rms_off_line(result, SITE) < 0.03
     known = next(o.tracks for o in reversed(result.outputs) if o.tracks is not None)
-    assert known.sensors.delay_s == pytest.approx(-unknowns.camera_delay_s, abs=0.008)
+    assert known.sensors.delay_s == pytest.approx(-unknowns.camera_delay_s, abs=0.004)
 
 
 def test_a_link_of_110_ms_both_ways_is_flown_by() -> None:

@@ -38,6 +38,7 @@ def test_what_was_found_stands_beside_what_was_drawn_with_the_same_keys(simulati
     told = sensor_summary(simulation, SEEN)
     assert told["estimated"] == {
         "camera_delay_s": pytest.approx(simulation.config.camera.latency_s + 0.012),
+        "delay_to_attitude_s": pytest.approx(simulation.config.camera.latency_s + 0.012),
         "mount_roll_deg": 0.5,
         "mount_pitch_deg": -0.25,
         "mount_yaw_deg": None,
@@ -60,6 +61,9 @@ def test_the_drawn_delay_is_the_whole_one(simulation: Simulation) -> None:
     drawn = sensor_summary(simulation, NOT_SEEN)["drawn"]
     delay_s = simulation.scenario.camera.capture_delay_s + simulation.unknowns.camera_delay_s
     assert drawn["camera_delay_s"] == pytest.approx(delay_s, abs=1e-4)
+    down_s, up_s = simulation.unknowns.path_s
+    assert abs(down_s - up_s) > 0.001
+    assert drawn["delay_to_attitude_s"] == pytest.approx(delay_s + 0.5 * (up_s - down_s), abs=1e-4)
     assert drawn["mount_yaw_deg"] == pytest.approx(math.degrees(simulation.unknowns.mount_yaw_rad), abs=1e-4)
 
 
