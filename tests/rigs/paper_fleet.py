@@ -23,6 +23,7 @@ from tests.rigs.paper_drones import STEP_S, PaperDrone, hall
 
 T = TypeVar("T")
 BODY = Measures(3.0, 1.0, 1.0, 0.6, 0.6, 0.3)
+_RESTS = {Phase.DONE, Phase.PREFLIGHT}
 
 
 async def until(condition: Callable[[], Any], within_s: float = 30.0) -> None:
@@ -146,6 +147,32 @@ async def on_way_to(node: str, fleet: PaperFleet) -> None:
     b = fleet.drones["b"]
     fleet.own.ask([node], "b")
     await until(lambda: b.phase is Phase.FOLLOW and b.way[0] == node, 100)
+
+
+def at_rest(fleet: PaperFleet) -> bool:
+    return all(drone.phase in _RESTS for drone in fleet.drones.values())
+
+
+async def until_done(fleet: PaperFleet, nodes: str) -> None:
+    """All these nodes; who was seen to be done with its flight is made ready for the next one, and what is
+    left once nobody flies is asked for again."""
+    wanted = set(nodes.split())
+    for _ in range(400):
+        await asyncio.sleep(1.0)
+        if set(fleet.state["done"]) == wanted and at_rest(fleet):
+            return
+        for name, drone in fleet.drones.items():
+            if drone.phase is Phase.DONE and not fleet.flown(name):
+                drone.begin_anew()
+        if fleet.state["open"] and all(drone.phase is Phase.PREFLIGHT for drone in fleet.drones.values()):
+            fleet.own.ask(fleet.state["open"])
+    pytest.fail(f"done are {fleet.state['done']}")
+
+
+def closure(fleet: PaperFleet) -> dict[str, Any]:
+    """The only one there is, as the station tells it."""
+    (only,) = fleet.state["closed"]
+    return dict(only)
 
 
 def fly(

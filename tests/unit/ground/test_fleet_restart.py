@@ -19,25 +19,7 @@ from flightd.ground.fleet.own_fleet import OwnFleet
 from flightd.ground.messages import Act
 from flightd.ground.own_database import OwnDatabase
 from tests.rigs.paper_drones import hall
-from tests.rigs.paper_fleet import PaperFleet, fly, on_way_to, until
-
-_RESTS = {Phase.DONE, Phase.PREFLIGHT}
-
-
-async def until_done(fleet: PaperFleet, nodes: str) -> None:
-    """All these nodes; who was seen to be done with its flight is made ready for the next one, and what is
-    left once nobody flies is asked for again."""
-    wanted = set(nodes.split())
-    for _ in range(400):
-        await asyncio.sleep(1.0)
-        if set(fleet.state["done"]) == wanted and at_rest(fleet):
-            return
-        for name, drone in fleet.drones.items():
-            if drone.phase is Phase.DONE and not fleet.flown(name):
-                drone.begin_anew()
-        if fleet.state["open"] and all(drone.phase is Phase.PREFLIGHT for drone in fleet.drones.values()):
-            fleet.own.ask(fleet.state["open"])
-    pytest.fail(f"done are {fleet.state['done']}")
+from tests.rigs.paper_fleet import PaperFleet, at_rest, fly, on_way_to, until, until_done
 
 
 async def die_with_work(fleet: PaperFleet) -> None:
@@ -47,10 +29,6 @@ async def die_with_work(fleet: PaperFleet) -> None:
     fleet.own.ask(["A3"])
     await asyncio.sleep(5.0)
     await fleet.kill()
-
-
-def at_rest(fleet: PaperFleet) -> bool:
-    return all(drone.phase in _RESTS for drone in fleet.drones.values())
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -34,8 +34,7 @@ from flightd.ground.valued_nodes import ByValue, valued_nodes
 from flightd.inventory.stock_columns import StockColumns
 from tests.rigs.event_loops import real
 from tests.rigs.paper_drones import hall
-from tests.rigs.paper_fleet import PaperFleet, fly, until
-from tests.unit.ground.test_fleet_restart import until_done
+from tests.rigs.paper_fleet import PaperFleet, fly, until, until_done
 
 _DAY_S = 86_400.0
 _NOW_NS = 1_760_000_000 * 10**9
