@@ -3,51 +3,36 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import os
 import random
 import shutil
 import sqlite3
 import subprocess
 import sys
-import tempfile
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import replace
 from pathlib import Path
 
-import msgspec
 import psycopg
 import pytest
 
-from flightd.adapters.store.kept_looks import KeptLook
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.core.errors import InputError, UnavailableError
-from flightd.core.inventory import LocationState, Observation, PlannedLocation, Standing
-from flightd.core.label_values import LabelValue, ValueKind, ValueSource
-from flightd.core.types import CodeRead
+from flightd.core.errors import UnavailableError
+from flightd.core.inventory import PlannedLocation, Standing
 from flightd.ground import stores
 from flightd.ground.decision_book import Decided, Decision, DecisionBook
 from flightd.ground.flights import log_folder
 from flightd.ground.ground_store import sender
-from flightd.ground.ground_store.batch import MOST_BATCH_BYTES, Batch, Receipt
-from flightd.ground.ground_store.between_flights import BetweenFlights, FlightBeganError
 from flightd.ground.ground_store.deliver_folder import deliver_paths
 from flightd.ground.ground_store.engine import Engine, Row, Session
 from flightd.ground.ground_store.evidence import Evidence, FolderEvidence
 from flightd.ground.ground_store.postgres_engine import PostgresSession
-from flightd.ground.ground_store.prune import prune
 from flightd.ground.ground_store.sender import Delivered, deliver_inventory
-from flightd.ground.ground_store.station_target import StationTarget
 from flightd.ground.ground_store.store import GroundStore
 from tests.command import Command
+from tests.unit.ground_store.store_rig import SITE, seen
 from tests.web.stock_rig import RACKS, counted_store, flown_log, picture_of
 
-SITE = "hall 3"
 CUTS = 200
-_NS = 1_000_000_000
-_BEGIN = 1_760_000_000 * _NS
 
 
 class Cuts:
@@ -103,14 +88,6 @@ class _CutSession:
     def run_many(self, sql: str, rows: Sequence[Sequence[object]]) -> None:
         self._cuts.cut(self._session)
         self._session.run_many(sql, rows)
-
-
-def seen(number: int, evidence: str = "") -> Observation:
-    """Ten places are counted over and over, a run each month."""
-    reads = (CodeRead("QR Code", f"PAL-{number % 7}", (), True, 3, 1.0),) if number % 4 else ()
-    state = LocationState.READ if reads else LocationState.EMPTY
-    at_ns = _BEGIN + number // 10 * 30 * 86_400 * _NS + number * _NS
-    return Observation(f"run {number // 10}", f"A-{number % 10}", at_ns, state, 0.5, reads, None, evidence)
 
 
 def same(store: GroundStore, inventory: SqliteStore) -> None:
@@ -371,274 +348,3 @@ def test_however_many_folders_there_are_each_inventory_is_delivered(
     deliver_paths([tmp_path], "", "station", store, done)
     assert done.looks == 5
     assert done.failures == [f"{tmp_path}: {log_folder.CUT}; deliver the folders in it one by one"]
-
-
-def test_a_batch_is_never_larger_than_a_station_takes(
-    store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with SqliteStore(tmp_path / "inventory") as inventory:
-        for number in range(300):
-            read = CodeRead("QR Code", f"{number}" + "x" * 30_000, (), True, 3, 1.0)
-            inventory.commit(replace(seen(1), utc_ns=_BEGIN + number, reads=(read,)))
-    sizes = []
-    take = store.take
-
-    def taken(batch: Batch) -> Receipt:
-        sizes.append(len(msgspec.json.encode(batch)))
-        return take(batch)
-
-    monkeypatch.setattr(store, "take", taken)
-    done = Delivered()
-    deliver_inventory(tmp_path / "inventory", SITE, "north", store, done)
-    assert done.looks == 300
-    assert MOST_BATCH_BYTES / 2 < max(sizes) <= MOST_BATCH_BYTES
-
-
-def test_looks_are_loaded_a_batch_at_a_time_and_those_that_the_store_has_not_at_all(
-    store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sender, "MOST_LOOKS", 10)
-    with SqliteStore(tmp_path / "inventory") as inventory:
-        for number in range(35):
-            inventory.commit(seen(number))
-    loaded: list[int] = []
-    load = SqliteStore.loaded
-
-    def told(inventory: SqliteStore, looks: Sequence[KeptLook]) -> list[tuple[Observation, Standing]]:
-        loaded.append(len(looks))
-        return load(inventory, looks)
-
-    monkeypatch.setattr(SqliteStore, "loaded", told)
-    for name in ("looks", "locations"):  # all at once
-        monkeypatch.delattr(SqliteStore, name)
-    for batches in ([10, 10, 10, 5], [0, 0, 0, 0]):
-        loaded.clear()
-        deliver_inventory(tmp_path / "inventory", SITE, "north", store, Delivered())
-        assert loaded == batches
-    loaded.clear()
-    assert prune(tmp_path / "inventory", store).looks == 25
-    assert loaded == []
-
-
-def test_what_is_found_printed_later_is_delivered_and_until_then_not_pruned(
-    store: GroundStore, tmp_path: Path
-) -> None:
-    lot = LabelValue(ValueKind.LOT, "B-4711", "", ValueSource.TEXT, 0.95)
-    best = LabelValue(ValueKind.BEST_BEFORE, "2027-01-31", "", ValueSource.TEXT, 0.99)
-    with SqliteStore(tmp_path / "inventory") as inventory:
-        for number in (1, 11, 21):
-            inventory.commit(seen(number))
-        inventory.keep_texts(seen(21).id, [lot], "first")
-        deliver_inventory(inventory.folder, SITE, "north", store, Delivered())
-        inventory.keep_texts(seen(1).id, [lot, best], "first")
-        pruned = prune(inventory.folder, store)
-        assert (pruned.looks, pruned.stay) == (1, 1)
-        done = Delivered()
-        deliver_inventory(inventory.folder, SITE, "north", store, done)
-        assert (done.looks, done.changed, done.already) == (0, 1, 1)
-        again = Delivered()
-        deliver_inventory(inventory.folder, SITE, "north", store, again)
-        assert (again.changed, again.already) == (0, 2)
-        assert prune(inventory.folder, store).looks == 1
-        assert [look.id for look, _ in inventory.looks()] == [seen(21).id]
-    told = {row["id"]: row["printed"] for row in store.history(SITE, "A-1")}
-    assert store.stock(SITE)[0]["printed"] == told[seen(21).id]
-    lot_told = {"kind": "lot", "value": "B-4711", "confidence": 0.95}
-    assert told == {
-        seen(1).id: [lot_told, {"kind": "best_before", "value": "2027-01-31", "confidence": 0.99}],
-        seen(11).id: [],
-        seen(21).id: [lot_told],
-    }
-
-
-def test_a_flight_that_begins_stops_a_delivery_and_the_rest_comes_after_it(
-    store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sender, "MOST_LOOKS", 10)
-    mark = tmp_path / "armed"
-    with SqliteStore(tmp_path / "inventory") as inventory:
-        for number in range(25):
-            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
-
-    take = store.take
-
-    def armed_meanwhile(batch: Batch) -> Receipt:
-        if batch.looks:
-            mark.touch()
-        return take(batch)
-
-    monkeypatch.setattr(store, "take", armed_meanwhile)
-    with pytest.raises(FlightBeganError, match="armed: a flight is on, what is left is for later"):
-        deliver_inventory(tmp_path / "inventory", SITE, "north", BetweenFlights(store, mark), Delivered())
-    assert store.counts()["looks"] == 10
-    with pytest.raises(FlightBeganError):
-        BetweenFlights(store, mark)
-    mark.unlink()
-    monkeypatch.undo()
-    deliver_inventory(tmp_path / "inventory", SITE, "north", BetweenFlights(store, mark), Delivered())
-    assert store.counts()["looks"] == 25
-
-
-def test_the_commands_do_nothing_while_a_flight_is_on(flightd: Command, tmp_path: Path) -> None:
-    counted_store(tmp_path / "monday")
-    mark, store = tmp_path / "armed", tmp_path / "counts.db"
-    mark.touch()
-    deliver = ("store", "deliver", tmp_path / "monday", "--store", store, "--site", SITE, "--unless", mark)
-    prune_it = ("store", "prune", tmp_path / "monday", "--store", store, "--unless", mark)
-    stopped = f"{mark}: a flight is on, what is left is for later"
-    for words in (deliver, prune_it):
-        ended = flightd(*words)
-        assert (ended.returncode, ended.stderr, ended.stdout.splitlines()[-1]) == (0, "", stopped)
-        assert json.loads(flightd(*words, "--json").stdout)["stopped"] == stopped
-    mark.unlink()
-    told = json.loads(flightd(*deliver, "--json").stdout)
-    assert (told["looks"], told["stopped"]) == (10, "")
-    assert json.loads(flightd(*prune_it, "--json").stdout)["stopped"] == ""
-
-
-def test_only_what_the_store_has_is_pruned(store: GroundStore, tmp_path: Path) -> None:
-    with SqliteStore(tmp_path / "inventory") as inventory:
-        for number in range(25):
-            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
-        assert (pruned := prune(inventory.folder, store)).looks == 0
-        assert pruned.stay == 20  # those of the newest run are not asked for
-        deliver_inventory(inventory.folder, SITE, "north", store, Delivered())
-        lost = inventory.looks()[3][0]
-        (tmp_path / "evidence" / lost.evidence[:2] / f"{lost.evidence}.jpg").unlink()  # in the store
-        before = inventory.locations()
-        pruned = prune(inventory.folder, store)
-        # 10 looks of run 0 without the one whose picture the store lost, and 5 of run 1 that run 2 follows
-        assert (pruned.looks, pruned.pictures, pruned.stay) == (14, 19, 1)
-        assert inventory.locations() == before
-        assert inventory.evidence.path(lost.evidence).exists()
-        assert lost in [look for look, _ in inventory.looks()]
-        assert prune(inventory.folder, store).looks == 0
-    assert store.counts()["looks"] == 25
-
-
-def test_looks_whose_pictures_are_damaged_are_pruned_once_they_are_in_the_store(
-    store: GroundStore, tmp_path: Path
-) -> None:
-    with SqliteStore(tmp_path / "inventory") as inventory:
-        for number in range(25):
-            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
-        damaged, unread = (inventory.evidence.path(look.evidence) for look, _ in inventory.looks()[:2])
-        damaged.write_bytes(bytes(20))
-        unread.unlink()
-        unread.mkdir()
-        done = Delivered()
-        deliver_inventory(inventory.folder, SITE, "north", store, done)
-        assert len(done.failures) == 2
-        pruned = prune(inventory.folder, store)
-        assert (pruned.looks, pruned.pictures, pruned.stay) == (14, 19, 1)
-        assert (damaged.exists(), unread.exists()) == (False, True)
-
-
-def test_no_inventory_is_copied_for_a_store_that_is_away(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    counted_store(tmp_path / "monday")
-    copies = tmp_path / "copies"
-    copies.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(copies))
-    made_ns = copies.stat().st_mtime_ns
-    done = Delivered()
-    with pytest.raises(UnavailableError, match="the station cannot be had"):
-        deliver_inventory(tmp_path / "monday", SITE, "north", StationTarget("http://127.0.0.1:1", "k"), done)
-    assert copies.stat().st_mtime_ns == made_ns
-
-
-def test_one_picture_that_is_damaged_or_cannot_be_read_keeps_no_other_look_back(
-    store: GroundStore, tmp_path: Path
-) -> None:
-    with SqliteStore(tmp_path / "inventory") as inventory:
-        for number in range(12):
-            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
-        looks = [look for look, _ in inventory.looks()]
-    zeroed, large, unread, gone, pipe = (inventory.evidence.path(look.evidence) for look in looks[:5])
-    zeroed.write_bytes(bytes(20))  # what a worn card makes of it
-    large.write_bytes(bytes(60_000))
-    unread.unlink()
-    unread.mkdir()
-    gone.unlink()
-    pipe.unlink()
-    os.mkfifo(pipe)
-    done = Delivered()
-    deliver_inventory(inventory.folder, SITE, "north", store, done)
-    assert sorted(done.failures) == sorted(
-        [
-            *(
-                f"{path}: the picture is damaged; its look is delivered without it"
-                for path in (zeroed, large, pipe)
-            ),
-            f"{unread}: Is a directory; its look waits for it",
-        ]
-    )
-    assert (done.looks, done.pictures) == (11, 7)
-    unread.rmdir()
-    unread.write_bytes(b"\xff\xd82")
-    again = Delivered()
-    deliver_inventory(inventory.folder, SITE, "north", store, again)
-    assert (again.looks, again.pictures, again.failures) == (1, 1, [])
-
-
-def test_pictures_are_asked_for_in_parts_that_are_answered_in_time(
-    store: GroundStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[int] = []
-    missing = store.missing_pictures
-
-    def noted(names: Sequence[str]) -> set[str]:
-        asked.append(len(names))
-        return missing(names)
-
-    monkeypatch.setattr(store, "missing_pictures", noted)
-    with SqliteStore(tmp_path / "inventory") as inventory:
-        for number in range(120):
-            inventory.commit(seen(number, inventory.keep_evidence(b"\xff\xd8%d" % number)))
-        done = Delivered()
-        deliver_inventory(inventory.folder, SITE, "north", store, done)
-        assert (done.pictures, asked) == (120, [50, 50, 20])
-        assert prune(inventory.folder, store).stay == 0
-        assert asked[3:] == [50, 50, 10]
-
-
-def test_pictures_far_away_are_looked_for_together(store: GroundStore) -> None:
-    together = threading.Barrier(4, timeout=30.0)
-
-    class Far(FolderEvidence):
-        def has(self, name: str) -> bool:
-            together.wait()
-            return name < "4"
-
-    store.evidence = Far(Path("unused"))
-    assert store.missing_pictures([f"{n}" for n in range(8)]) == {"4", "5", "6", "7"}
-
-
-def test_what_a_clock_that_is_ahead_counted_stays_at_the_drone_and_is_told(
-    engine: Callable[[], Engine], tmp_path: Path
-) -> None:
-    with (
-        GroundStore(engine(), FolderEvidence(tmp_path), lambda: _BEGIN + 30 * 86_400 * _NS) as store,
-        SqliteStore(tmp_path / "inventory") as inventory,
-    ):
-        for number in range(25):  # the last five are a month ahead
-            inventory.commit(seen(number))
-        done = Delivered()
-        deliver_inventory(inventory.folder, SITE, "north", store, done)
-        assert (done.looks, done.ahead) == (20, 5)
-        with pytest.raises(InputError, match="stay here: the clock of drone or store is wrong; set it"):
-            done.check_clocks()
-        inventory.commit(replace(seen(3), run="next", utc_ns=_BEGIN + 70 * 86_400 * _NS))
-        assert prune(inventory.folder, store).stay == 5
-        assert {row["run"] for row in store.stock(SITE)} == {"run 1"}
-
-
-def test_places_follow_the_plan_of_the_newest_inventory(store: GroundStore, tmp_path: Path) -> None:
-    for name, number in (("monday", 3), ("tuesday", 13)):
-        with SqliteStore(tmp_path / name) as inventory:
-            inventory.plan([PlannedLocation("A-3", f"node of {name}")])
-            inventory.commit(seen(number))
-    for name in ("monday", "tuesday", "monday"):
-        deliver_inventory(tmp_path / name, SITE, "north", store, Delivered())
-    assert [row["node"] for row in store.stock(SITE)] == ["node of tuesday"]
