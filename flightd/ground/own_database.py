@@ -62,6 +62,8 @@ class OwnDatabase:
             self.file.stat()
         except FileNotFoundError:
             return False
+        except NotADirectoryError as err:
+            raise UnavailableError(f"{self.file}: {err.strerror}", remedy="give a folder") from None
         except OSError as err:
             raise UnavailableError(f"{self.file}: {err.strerror}", remedy=self.remedy) from None
         return True

@@ -10,7 +10,7 @@ import os
 import secrets
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias, TypeVar
 from urllib.parse import urlsplit
@@ -98,7 +98,7 @@ class SharedFolder:
         return self._done(f"{name} cannot be read", content)
 
     def write(self, name: str, data: bytes, *, alone: bool = True) -> None:
-        """All of it under its name, or none; on the disk, where that is here.  What a cut leaves beside it
+        """All of it under its name, or none; on the disk, where that is here.  What a kill leaves beside it
         the next try writes anew; where others may write the same file now, not `alone`, it stays."""
         path, own = PurePosixPath(name), "" if alone else f".{secrets.token_hex(4)}"
         beside = self._at(str(path.with_name(f".{path.name}{own}.tmp")))
@@ -108,12 +108,17 @@ class SharedFolder:
                 self._files.pipe_file(self._at(name), data)
                 return
             self._make(name)
-            with self._files.open(beside, "wb") as stream:
-                stream.write(data)
-                stream.flush()
-                if self._is_here:
-                    os.fsync(stream.fileno())
-            self._rename(beside, self._at(name))
+            try:
+                with self._files.open(beside, "wb") as stream:
+                    stream.write(data)
+                    stream.flush()
+                    if self._is_here:
+                        os.fsync(stream.fileno())
+                self._rename(beside, self._at(name))
+            except remote_errors():
+                with suppress(*remote_errors()):
+                    self._files.rm_file(beside)
+                raise
 
         self._done(f"{name} cannot be written", written)
 

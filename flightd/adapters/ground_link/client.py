@@ -9,7 +9,7 @@ import uuid
 from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Final, Self, TypeVar
 
 import zmq
 import zmq.asyncio
@@ -79,6 +79,15 @@ _NAME_S = 1.0
 _KINDS_OF_INPUT = {
     Code.MALFORMED, Code.VERSION, Code.NODE, Code.PLAN, Code.UNAVAILABLE, Code.INVALID,
 }  # fmt: skip
+_WATCHED: Final = (
+    zmq.Event.CONNECTED
+    | zmq.Event.HANDSHAKE_SUCCEEDED
+    | zmq.Event.HANDSHAKE_FAILED_AUTH
+    | zmq.Event.HANDSHAKE_FAILED_PROTOCOL
+    | zmq.Event.HANDSHAKE_FAILED_NO_DETAIL
+)
+"""What is asked for of what ZMQ tells.  It waits until that is read, and so would the end of the connection:
+of all that it tells of each new try, nobody could leave a daemon that was away for a minute."""
 _SHUT_OUT = {zmq.Event.HANDSHAKE_FAILED_AUTH, zmq.Event.HANDSHAKE_FAILED_PROTOCOL}
 """Events after which asking again is of no use."""
 
@@ -124,7 +133,7 @@ class GroundClient:
         self._context = zmq.asyncio.Context()
         self._requests: Any = self._socket(zmq.DEALER)
         self._status: Any = self._socket(zmq.SUB)
-        self._monitor: Any = self._requests.get_monitor_socket()
+        self._monitor: Any = self._requests.get_monitor_socket(_WATCHED)
         self._asked: dict[asyncio.Future[tuple[Answer, list[bytes]]], str] = {}
         """What waits, for the answer to which request: an order may be sent again while the first waits."""
         self._reading: asyncio.Task[None] | None = None

@@ -26,7 +26,7 @@ from flightd.app.log_study.recorded_simulation import recorded_simulation
 from flightd.app.recording import SETTING_TOPICS, recorded_setting
 from flightd.app.simulation.judgement import judge_flight
 from flightd.core.errors import InputError
-from flightd.core.inventory import KnownLocations, LocationRecord, Observation, Standing
+from flightd.core.inventory import KnownLocations, Observation, Standing
 from flightd.core.topics import Topic
 from flightd.core.types import Image
 from flightd.replay.decision_compare import comparison_document, replay_decisions
@@ -40,6 +40,8 @@ from flightd.vision.shelf.code_reader import read_codes
 
 _LOST_SHARE: Final = 0.02
 """Labels that the compression of the kept picture may cost."""
+_NEIGHBOURS_M: Final = 2.0
+"""Between where two places were seen from: wider a picture of a shelf is not."""
 _JUDGED_WITHIN: Final = 1e-6
 
 
@@ -92,10 +94,9 @@ def _codes(path: Path, folder: Path) -> Finding:
     if not looks:
         return Finding(Outcome.NOTHING, f"the inventory has no confirmed look of its run {run}".rstrip())
     newest = {seen.location: seen for seen in looks}
-    told_anywhere = _told_anywhere(places, newest.values())
-    labels = {place.code for place in places}
+    nodes, labels = {place.code: place.node for place in places}, {place.code for place in places}
     known = KnownLocations(labels)
-    pictures = gone = same = more = 0
+    pictures = gone = same = more = left_out = 0
     lost: list[str] = []
     other: list[str] = []
     for seen in newest.values():
@@ -106,7 +107,14 @@ def _codes(path: Path, folder: Path) -> Finding:
         pictures += 1
         read = {read.text for read in read_codes(picture) if read.believed}
         # the picture shows the place's own label, too, and may show a neighbour's goods
-        now = {text for text in read - (told_anywhere - before) if known.spelled(text) not in labels}
+        label = {text for text in read - before if known.spelled(text) in labels}
+        others = _beside(seen, newest.values(), nodes)
+        if before:
+            others |= {code.text for code in seen.undecided}
+        missed = before - read
+        others = {text for text in others - before if not any(text in whole for whole in missed)}
+        now = read - label - others
+        left_out += len(read & others)
         if not before:
             more += bool(now)
         elif now == before:
@@ -122,17 +130,28 @@ def _codes(path: Path, folder: Path) -> Finding:
     if len(lost) > allowed:
         told.append(f"{len(lost)} places not read again, {allowed} allowed, first {lost[0]}")
     figures = {
-        "pictures": pictures, "without_picture": gone, "same": same, "newly_read": more,
+        "pictures": pictures, "without_picture": gone, "same": same, "newly_read": more, "left_out": left_out,
         "lost": sorted(lost), "otherwise": sorted(other),
     }  # fmt: skip
     return same_or("; ".join(told), figures)
 
 
-def _told_anywhere(places: Iterable[LocationRecord], looks: Iterable[Observation]) -> set[str]:
-    """Every code that was told of a place, as it counts now or by the `looks`, with what stayed undecided."""
-    told = {text for place in places for text in place.texts}
-    return told.union(
-        *({read.text for read in seen.reads} | {code.text for code in seen.undecided} for seen in looks)
+def _beside(seen: Observation, looks: Iterable[Observation], nodes: Mapping[str, str]) -> set[str]:
+    """What the flight told of other places that the picture of a look may show, undecided or not."""
+    near = [one for one in looks if one.location != seen.location and _may_show(seen, one, nodes)]
+    read = {read.text for one in near for read in one.reads}
+    return read | {code.text for one in near for code in one.undecided}
+
+
+def _may_show(seen: Observation, other: Observation, nodes: Mapping[str, str]) -> bool:
+    """Whether two places are so near that a picture of one may show goods of the other."""
+    if nodes.get(seen.location) == nodes.get(other.location):
+        return True
+    a, b = seen.pose, other.pose
+    return (
+        a is not None
+        and b is not None
+        and math.dist((a.x_m, a.y_m, a.height_m), (b.x_m, b.y_m, b.height_m)) < _NEIGHBOURS_M
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, TypeAlias
 
+from flightd.adapters.vehicle.mavlink.required_parameters import FIRMWARES
 from flightd.app.simulation.simulation import Simulation
 from flightd.core.tracks import SensorEstimate
 
@@ -16,11 +17,11 @@ def sensor_summary(simulation: Simulation, seen: SensorEstimate) -> dict[str, An
     and `drawn`, the same keys each.
 
     The camera's delay is whole, configuration included; `delay_to_attitude_s` is that beside the told
-    attitude, which is what the lines tell: by half of what the ways there and back differ, all attitudes are
-    stamped wrong once clocks have been compared (Mills, RFC 5905).  The mount's angles and the focal length
-    are beyond the configured ones; the height is by how much the told one is too small for good, which no
-    world draws; the tilt bias is by how much the told roll and pitch are too large, as two angles and their
-    hypotenuse.
+    attitude, which is what the lines tell: by half of what the ways there and back differ, all attitudes of a
+    MAVLink autopilot are stamped wrong once clocks have been compared (Mills, RFC 5905).  The mount's angles
+    and the focal length are beyond the configured ones; the height is by how much the told one is too small
+    for good, which no world draws; the tilt bias is by how much the told roll and pitch are too large, as two
+    angles and their hypotenuse.
     None for what nobody estimates, and before any line was seen."""
     return {
         "estimated": _estimated(seen, simulation.config.camera.latency_s),
@@ -60,9 +61,11 @@ def _drawn(simulation: Simulation) -> Known:
     roll_rad, pitch_rad = unknowns.tilt_bias_rad or (math.nan, math.nan)
     delay_s = unknowns.camera(configured).capture_delay_s
     down, up = unknowns.radio(simulation.scenario.vehicle.radio())
+    is_autopilot = simulation.config.vehicle.kind in FIRMWARES and not simulation.truth_url
+    late_s = 0.5 * (down.delay_s - up.delay_s) if is_autopilot else math.nan
     return _rounded(
         camera_delay_s=delay_s,
-        delay_to_attitude_s=delay_s - 0.5 * (down.delay_s - up.delay_s),
+        delay_to_attitude_s=delay_s - late_s,
         mount_roll_deg=math.degrees(unknowns.mount_roll_rad),
         mount_pitch_deg=math.degrees(unknowns.mount_pitch_rad),
         mount_yaw_deg=math.degrees(unknowns.mount_yaw_rad),

@@ -7,13 +7,17 @@ import platform
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
+from unicodedata import category
 
 import typer
 
 from flightd.cli.options import AsJson
 from flightd.cli.store.options import Pictures, StoreOrStation, Unless, between_flights
 from flightd.core.errors import InputError
+
+_OF_NO_NAME: Final = {"Cc", "Zl", "Zp"}
+"""Categories of Unicode: control signs and ends of lines."""
 
 
 def register(app: typer.Typer) -> None:
@@ -62,8 +66,9 @@ def deliver(
     from flightd.ground.ground_store.deliver_folder import deliver_paths
     from flightd.ground.ground_store.sender import Delivered
 
-    if not site.isprintable():
-        raise InputError("is no name", key=f"--site {site!r}", remedy="give one of a line, without tabs")
+    for key, name in {"--site": site, "--source": source}.items():
+        if any(category(sign) in _OF_NO_NAME for sign in name):
+            raise InputError("is no name", key=f"{key} {name!r}", remedy="give one of a line, without tabs")
     done, stopped = Delivered(), ""
     try:
         with between_flights(store, evidence, unless) as into:
@@ -111,7 +116,7 @@ def prune(
 
     pruned, stopped = Pruned(0, 0, 0), ""
     try:
-        with between_flights(store, evidence, unless) as into:
+        with between_flights(store, evidence, unless, made=False) as into:
             pruned = prune_folder(folder, into)
     except FlightBeganError as err:
         stopped = str(err)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from flightd.core.errors import InputError
+from flightd.core.errors import InputError, UnavailableError
 
 if TYPE_CHECKING:
     from flightd.ground.ground_store.sender import Target
@@ -62,9 +62,11 @@ Unless: TypeAlias = Annotated[
 
 
 @contextmanager
-def between_flights(store: str, evidence: str | None, unless: Path | None) -> Iterator[Target]:
+def between_flights(
+    store: str, evidence: str | None, unless: Path | None, *, made: bool = True
+) -> Iterator[Target]:
     """As `target`; FlightBeganError where there is a file `unless`."""
-    with target(store, evidence) as into:
+    with target(store, evidence, made=made) as into:
         if unless is None:
             yield into
             return
@@ -74,22 +76,29 @@ def between_flights(store: str, evidence: str | None, unless: Path | None) -> It
 
 
 @contextmanager
-def target(store: str, evidence: str | None) -> Iterator[Target]:
-    """A store that is opened meanwhile, or a station.  Errors as `opened` and `StationTarget`."""
+def target(store: str, evidence: str | None, *, made: bool = True) -> Iterator[Target]:
+    """A store that is opened meanwhile, and `made` where it is not there, or a station.  Errors as `opened`,
+    `opened_to_read` and `StationTarget`."""
     if store.startswith(("http://", "https://")):
         from flightd.ground.ground_store.station_target import StationTarget
 
         yield StationTarget(store, os.environ.get("FLIGHTD_STORE_KEY", ""))
         return
-    with opened(store, evidence) as found:
+    with (opened if made else opened_to_read)(store, evidence) as found:
         yield found
 
 
 def opened_to_read(store: str, evidence: str | None) -> GroundStore:
     """As `opened`, but a file that is not there is a mistyped one, and none is made."""
-    if store and "://" not in store and not Path(store).exists():
-        remedy = "give that of one, or deliver into it"
-        raise InputError("there is no such file", key=f"--store {store}", remedy=remedy)
+    if store and "://" not in store:
+        try:
+            Path(store).stat()  # `exists` raises for another user's folder, or tells that nothing is there
+        except (FileNotFoundError, NotADirectoryError):
+            remedy = "give that of one, or deliver into it"
+            raise InputError("there is no such file", key=f"--store {store}", remedy=remedy) from None
+        except OSError as err:
+            remedy = "may flightd read file and folder?"
+            raise UnavailableError(f"{err.strerror}", file=store, remedy=remedy) from None
     return opened(store, evidence)
 
 

@@ -205,7 +205,9 @@ def deliver_flights(
         if row.outcome and not row.running and (row.site or site):
             by_site.setdefault(row.site or site, []).append(_flight(log, row))
         elif all_expected:
-            why = row.trouble or "nothing says of which site the flight is; deliver it with --site NAME"
+            is_over = row.outcome and not row.running
+            why = "" if is_over else row.trouble
+            why = why or "nothing says of which site the flight is; deliver it with --site NAME"
             done.failures.append(f"{log.root / log.relative}: {why}")
     for name, flights in by_site.items():
         for part in _parts(flights):

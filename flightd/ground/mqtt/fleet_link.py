@@ -75,13 +75,13 @@ class DroneAtBroker:
     async def _connected(self) -> None:
         vehicle = self._drone.vehicle
         async with self._client() as client:
-            if self._failures:
-                _LOG.warning("%s: %s: connected", self._name, self._broker.shown)
-            self._failures = 0
             try:
                 async with asyncio.TaskGroup() as tasks:
                     for kind in (Order, InstantActions):
                         await _answered(client.subscribe(self._at(kind)))
+                    if self._failures:
+                        _LOG.warning("%s: %s: connected", self._name, self._broker.shown)
+                    self._failures = 0
                     self._drone.at_broker = True
                     tasks.create_task(self._listen(client), name=f"{self._name} at the broker")
                     tasks.create_task(self._say(client), name=f"{self._name} to the broker")

@@ -33,7 +33,8 @@ def test_a_flight_tells_what_the_configuration_did_not_know(flightd: Command, re
     error_px = focal["fitted"] - focal["configured"] * truth["focal_share"]
     assert abs(error_px) < 3.0 * focal["sigma"] < 2.5
     delay = fitted["camera delay"]
-    assert abs(delay["fitted"] - 0.06 - truth["camera_delay_s"]) < 0.012
+    down_s, up_s = truth["path_s"]
+    assert abs(delay["fitted"] - 0.06 - truth["camera_delay_s"] + 0.5 * (down_s - up_s)) < 0.012
     bias_deg = [-math.degrees(one) for one in truth["tilt_bias_rad"]]
     for axis, expected_deg in zip(("roll", "pitch"), bias_deg, strict=True):
         assert abs(fitted[f"tilt bias {axis}"]["fitted"] - expected_deg) < 0.75

@@ -6,6 +6,7 @@ import asyncio
 import json
 import random
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import Sequence
@@ -26,6 +27,7 @@ from flightd.core.errors import InputError, RunError, UnavailableError
 from flightd.core.preview import CameraName, Preview
 from flightd.core.types import CommandKind, Phase
 from flightd.runtime.clock import LoopClock
+from flightd.runtime.free_ports import free_ports
 from flightd.runtime.within import Within
 from flightd.site.site import Aisle, Edge, Node
 from tests.rigs.event_loops import in_real_time
@@ -40,9 +42,26 @@ from tests.rigs.ground_link import (
     tell_once,
     telling,
 )
+from tests.rigs.patience import COMMAND_S
 from tests.rigs.waiting import until
 
 EXAMPLE = Path(__file__).parents[3] / "tools" / "ground_client.py"
+LEAVING = """
+import asyncio
+import sys
+
+from flightd.adapters.ground_link.client import Address, GroundClient
+
+
+async def main():
+    client = GroundClient(Address("127.0.0.1", *map(int, sys.argv[1:])))
+    client._requests.reconnect_ivl = 1  # a second in place of two minutes
+    async with client:
+        await asyncio.sleep(5)
+
+
+asyncio.run(main())
+"""
 
 
 @in_real_time
@@ -388,3 +407,9 @@ async def test_nobody_there_is_said_so() -> None:
     async with GroundClient(nobody, timeout_s=0.5) as client:
         with pytest.raises(UnavailableError, match="nobody listens"):
             await client.hello()
+
+
+def test_who_asks_nothing_of_a_daemon_that_is_away_for_long_can_leave_it() -> None:
+    """In a process of its own: one that hangs there can be ended in no other way."""
+    words = [sys.executable, "-c", LEAVING, *map(str, free_ports(2, socket.SOCK_STREAM))]
+    assert subprocess.run(words, timeout=COMMAND_S, check=False).returncode == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -81,14 +82,31 @@ def test_wrong_input_is_one_line(run: Run, words: tuple[str, ...], typed: str, s
 
 
 @pytest.mark.parametrize("words", [("people", "list"), ("keys", "list"), ("audit",)])
-def test_a_state_folder_that_cannot_be_looked_into_is_one_line_and_not_nobody(
+def test_a_state_folder_that_is_none_is_one_line_and_not_nobody(
     run: Run, tmp_path: Path, words: tuple[str, ...]
 ) -> None:
     (tmp_path / "state").write_text("a file, no folder", encoding="utf-8")
     code, out, err = run(*words)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"flightd: {tmp_path / 'state'}")
-    assert "Not a directory; be the user that the station runs as" in err
+    assert "Not a directory" in err
+
+
+@pytest.mark.parametrize("words", [("people", "list"), ("keys", "list")])
+def test_another_users_state_folder_is_one_line_and_not_nobody(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+) -> None:
+    stat = Path.stat
+
+    def kept_out(path: Path, **options: bool) -> os.stat_result:
+        if path.parent == tmp_path / "state":
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return stat(path, **options)
+
+    monkeypatch.setattr(Path, "stat", kept_out)
+    code, out, err = run(*words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "Permission denied; be the user that the station runs as" in err
 
 
 def test_at_a_terminal_the_password_is_typed_twice_and_not_shown(tmp_path: Path) -> None:

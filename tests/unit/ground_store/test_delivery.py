@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 import random
 import shutil
 import sqlite3
@@ -245,19 +247,39 @@ def test_a_log_that_is_named_and_holds_no_flight_is_told(
 def test_a_store_that_is_only_read_is_not_made_by_a_mistyped_name(flightd: Command, tmp_path: Path) -> None:
     file = tmp_path / "conuts.db"
     told = f"flightd: --store {file}: there is no such file; give that of one, or deliver into it\n"
-    for words in (("show",), ("export", "--out", tmp_path / "tables")):
+    counted_store(tmp_path / "monday")
+    for words in (("show",), ("export", "--out", tmp_path / "tables"), ("prune", tmp_path / "monday")):
         ended = flightd("store", *words, "--store", file)
         assert (ended.returncode, ended.stdout, ended.stderr) == (2, "", told)
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["monday"]
+
+
+def test_a_store_that_the_system_keeps_to_itself_is_not_told_as_missing(
+    flightd: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, stat = tmp_path / "counts.db", Path.stat
+
+    def kept_out(path: Path, **options: bool) -> os.stat_result:
+        if path == file:
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return stat(path, **options)
+
+    monkeypatch.setattr(Path, "stat", kept_out)
+    ended = flightd("store", "show", "--store", file)
+    assert ended.returncode == 2
+    assert ended.stderr == f"flightd: {file}: Permission denied; may flightd read file and folder?\n"
 
 
 def test_a_site_is_a_name_of_one_line(flightd: Command, tmp_path: Path) -> None:
     counted_store(tmp_path / "monday")
     file = tmp_path / "counts.db"
-    ended = flightd("store", "deliver", tmp_path / "monday", "--store", file, "--site", "hall\n3")
-    assert ended.returncode == 2
-    assert ended.stderr.startswith("flightd: --site 'hall\\n3': is no name; ")
+    deliver = ("store", "deliver", tmp_path / "monday", "--store", file)
+    for option in ("--site", "--source"):
+        ended = flightd(*deliver, option, "hall\n3")
+        assert ended.returncode == 2
+        assert ended.stderr.startswith(f"flightd: {option} 'hall\\n3': is no name; ")
     assert not file.exists()
+    assert flightd(*deliver, "--site", "Halle\N{NO-BREAK SPACE}3").returncode == 0
 
 
 def test_an_inventory_says_itself_of_which_site_it_is(store: GroundStore, tmp_path: Path) -> None:

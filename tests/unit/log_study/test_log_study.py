@@ -31,7 +31,7 @@ from flightd.app.log_study.ray_engine import run_ray
 from flightd.app.log_study.sources import LogSource, log_sources
 from flightd.config.schema import load_config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
-from flightd.core.inventory import LocationState, PlannedLocation
+from flightd.core.inventory import CountPose, LocationState, PlannedLocation, UndecidedCode
 from flightd.core.topics import Document, RecordedFrame, Topic
 from flightd.replay.log import read_log
 from tests.command import Command
@@ -194,6 +194,35 @@ def test_a_places_own_label_and_a_neighbours_goods_in_its_picture_are_no_differe
     assert figures["same"] == 2
     assert (figures["otherwise"], figures["newly_read"]) == ([], 0)
     assert figures["lost"] == ["A-4"], "its own label alone is no goods"
+    assert figures["left_out"] == 2
+
+
+def test_what_is_told_elsewhere_hides_no_difference(flightd: Command, tmp_path: Path) -> None:
+    with McapRecorder(tmp_path / "flight.mcap", metadata={"run": "monday"}, when_full=wait_for_disk):
+        pass
+    far = CountPose("C1", 20.0, 0.0, 1.6, 0.0)
+    with SqliteStore(tmp_path) as inventory:
+        kept = {text: inventory.keep_evidence(picture_of(text)) for text in ("PAL-1", "PAL-7", "PAL-9")}
+        unsure = look("A-1", LocationState.UNREADABLE, run="monday", evidence=kept["PAL-7"])
+        seen = [
+            replace(unsure, undecided=(UndecidedCode("QR Code", "PAL-7", 1),)),
+            look("B-1", LocationState.READ, code("PAL-12"), run="monday", evidence=kept["PAL-1"]),
+            look("B-2", LocationState.READ, code("PAL-1"), run="monday", evidence=kept["PAL-1"]),
+            look("B-3", LocationState.READ, code("PAL-3"), run="monday", evidence=kept["PAL-9"]),
+            replace(look("C-1", LocationState.READ, code("PAL-9"), run="monday"), pose=far),
+        ]
+        inventory.plan(PlannedLocation(one.location, f"{one.location[0]}1") for one in seen)
+        for one in seen:
+            inventory.commit(one)
+    (log,) = json.loads(flightd("study", tmp_path, "--with", "codes", "--json", "--workers", 1).stdout)[
+        "logs"
+    ]
+    figures = log["studies"]["codes"]["figures"]
+    assert figures["newly_read"] == 1, "what was too little to count is read now"
+    assert figures["otherwise"] == ["B-1", "B-3"], (
+        "a part of its code, and goods of the other end of the hall"
+    )
+    assert (figures["same"], figures["lost"]) == (1, [])
 
 
 @pytest.mark.parametrize("work", [dies_once, always_dies])

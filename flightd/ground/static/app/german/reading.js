@@ -5,7 +5,7 @@ const MOST_PARTS = 8; // of a text that is taken to pieces
 const PLACE = /\{(\w+)\}/;
 const NAME = /^(?:\S*|'.*'|".*"|\S+ \(\S*\)\S*)$/s; // one word, quoted, or a key as `pad[0] (home).node`
 const LIST = /^\S+(?:, \S+)+$/;
-// Fields that are shown as they are.
+// Fields that are shown as they are, even where such a word has its German.
 const VERBATIM = new Set(["columns", "drone", "file", "folder", "home", "key", "known", "name", "node", "pad", "person", "site", "url"]);
 
 // A function from such a text to its parts: {text, foreign: it stays English}.  `texts`: {english: german}, with

@@ -468,6 +468,7 @@ export default {
   // site files
   "this map cannot be worked on": "an dieser Karte lässt sich nicht arbeiten",
   "the station was told no folder to keep sites in": "der Station wurde kein Ordner für Hallen genannt",
+  "give a folder": "geben Sie einen Ordner an",
   "give it --folder DIR": "geben Sie ihr --folder DIR",
   "{name} is no name for a site file": "{name} ist kein Name für eine Hallendatei",
   "take letters and digits, as in hall-3.toml": "nehmen Sie Buchstaben und Ziffern, wie in hall-3.toml",
@@ -520,7 +521,7 @@ export default {
   "{where}: LIF does not know {value}": "{where}: LIF kennt {value} nicht",
   "mend it in the program that wrote it": "berichtigen Sie es in dem Programm, das die Datei geschrieben hat",
   "layouts[0].nodes[{i}].nodeId: {node} comes twice": "layouts[0].nodes[{i}].nodeId: {node} kommt zweimal vor",
-  "layouts[0].edges[{i}].{end}NodeId: there is no node {node}": "layouts[0].edges[{i}].{end}NodeId: Es gibt keinen Knoten {node}",
+  "layouts[0].edges[{i}].{key}NodeId: there is no node {node}": "layouts[0].edges[{i}].{key}NodeId: Es gibt keinen Knoten {node}",
   "the file has {n} layouts; this is the first": "die Datei hat {n} Layouts; dies ist das erste",
   "the ways of all vehicle types are taken: {types}": "die Wege aller Fahrzeugtypen sind übernommen: {types}",
   "of {kind} not held by a site: {keys}": "von {kind} in einer Hallendatei nicht enthalten: {keys}",
