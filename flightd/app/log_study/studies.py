@@ -94,8 +94,8 @@ def _codes(path: Path, folder: Path) -> Finding:
     if not looks:
         return Finding(Outcome.NOTHING, f"the inventory has no confirmed look of its run {run}".rstrip())
     newest = {seen.location: seen for seen in looks}
-    nodes, labels = {place.code: place.node for place in places}, {place.code for place in places}
-    known = KnownLocations(labels)
+    nodes = {place.code: place.node for place in places}
+    known = KnownLocations(nodes)
     pictures = gone = same = more = left_out = 0
     lost: list[str] = []
     other: list[str] = []
@@ -107,14 +107,10 @@ def _codes(path: Path, folder: Path) -> Finding:
         pictures += 1
         read = {read.text for read in read_codes(picture) if read.believed}
         # the picture shows the place's own label, too, and may show a neighbour's goods
-        label = {text for text in read - before if known.spelled(text) in labels}
-        others = _beside(seen, newest.values(), nodes)
-        if before:
-            others |= {code.text for code in seen.undecided}
-        missed = before - read
-        others = {text for text in others - before if not any(text in whole for whole in missed)}
-        now = read - label - others
-        left_out += len(read & others)
+        strange = {text for text in read - before if known.spelled(text) not in nodes}
+        others = _of_others(strange, before - read, seen, newest.values(), nodes) if strange else set()
+        now = (read & before) | (strange - others)
+        left_out += len(others)
         if not before:
             more += bool(now)
         elif now == before:
@@ -134,6 +130,21 @@ def _codes(path: Path, folder: Path) -> Finding:
         "lost": sorted(lost), "otherwise": sorted(other),
     }  # fmt: skip
     return same_or("; ".join(told), figures)
+
+
+def _of_others(
+    strange: set[str],
+    missed: set[str],
+    seen: Observation,
+    looks: Iterable[Observation],
+    nodes: Mapping[str, str],
+) -> set[str]:
+    """Of the `strange` codes in a look's picture those that hang beside its place, or were too little to
+    count beside its own; none that may be a part of a `missed` one."""
+    told = _beside(seen, looks, nodes)
+    if seen.reads:
+        told |= {code.text for code in seen.undecided}
+    return {text for text in strange & told if not any(text in whole for whole in missed)}
 
 
 def _beside(seen: Observation, looks: Iterable[Observation], nodes: Mapping[str, str]) -> set[str]:

@@ -202,12 +202,13 @@ def deliver_flights(
     all_over = True
     for log, row in zip(logs, read_rows(tuple(logs)), strict=True):
         all_over &= not row.running
-        if row.outcome and not row.running and (row.site or site):
+        is_over = row.outcome and not row.running
+        if is_over and (row.site or site):
             by_site.setdefault(row.site or site, []).append(_flight(log, row))
         elif all_expected:
-            is_over = row.outcome and not row.running
-            why = "" if is_over else row.trouble
-            why = why or "nothing says of which site the flight is; deliver it with --site NAME"
+            why = "nothing says of which site the flight is; deliver it with --site NAME"
+            if not is_over:
+                why = row.trouble or why
             done.failures.append(f"{log.root / log.relative}: {why}")
     for name, flights in by_site.items():
         for part in _parts(flights):
