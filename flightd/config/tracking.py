@@ -76,8 +76,11 @@ class SensorPriors(Section):
 
     @property
     def shake_bounds_rad(self) -> tuple[float, float]:
-        """The least and the most that is believed of the shaking."""
-        return math.radians(0.03), math.radians(self.most_shake_deg)
+        """The least and the most that is believed of the shaking.
+
+        Less than a tenth of a degree cannot be told from what single lines err by; were it taken for none,
+        the speeds that it shakes would tell a delay that is not there."""
+        return math.radians(0.1), math.radians(self.most_shake_deg)
 
 
 class TrackingExpert(Section):

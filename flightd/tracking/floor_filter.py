@@ -68,6 +68,8 @@ _MOST_LEAK_PER_S = 1.0
 _MOST_SCALE = 0.5
 _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
+_DELAY_UNSEEN_S = 0.002
+"""What the shake of frames makes of their delay, and no row tells: usual flights err to one side by it."""
 _OUTLIER_SIGMAS = 3.0
 """What errs by more is weighed less (Huber)."""
 _FRESH, _TELLING, _FEATURE_SIGMAS = 3, 2, 4.0
@@ -116,6 +118,11 @@ class FloorFilter:
     def sigma(self, index: int) -> float:
         return math.sqrt(max(self._p.item(index, index), 0.0))
 
+    @property
+    def delay_sigma_s(self) -> float:
+        """How well the delay of the frames is known: beside the filter's own doubt, by what it cannot see."""
+        return math.hypot(self.sigma(DELAY), _DELAY_UNSEEN_S)
+
     def without_errors(self) -> Matrix:
         """The first states, were the told attitude right."""
         state = self._x[:FIRST_LINE].copy()
@@ -141,7 +148,7 @@ class FloorFilter:
         """What is known of the sensors, for people."""
         return SensorEstimate(
             delay_s=self.mean(DELAY),
-            delay_sigma_s=self.sigma(DELAY),
+            delay_sigma_s=self.delay_sigma_s,
             mount_roll_rad=self.mean(MOUNT_ROLL),
             mount_pitch_rad=self.mean(MOUNT_PITCH),
             mount_sigma_rad=max(self.sigma(MOUNT_ROLL), self.sigma(MOUNT_PITCH)),
@@ -426,7 +433,7 @@ class FloorFilter:
         self._bound(HEIGHT_SCALE, -_MOST_SCALE, _MOST_SCALE)
         self._bound(DELAY, -delay_s, min(delay_s, self._latency_s))  # no frame arrives before it is exposed
         if minded:
-            self._mind(errors / np.sqrt(np.diag(spread)), measured.axes)
+            self._mind(errors, spread, by_tilt, measured.axes)
 
     def _bound_push(self) -> None:
         for push in PUSH:
@@ -435,12 +442,16 @@ class FloorFilter:
     def _bound(self, index: int, least: float, most: float) -> None:
         self._x[index] = min(max(self._x[index], least), most)
 
-    def _mind(self, told: Matrix, axes: list[int | None]) -> None:
+    def _mind(self, errors: Matrix, spread: Matrix, by_tilt: Matrix, axes: list[int | None]) -> None:
+        told = errors / np.sqrt(np.diag(spread))
         for axis in range(2):
             mine = [-float(error) for error, of in zip(told, axes, strict=True) if of == axis]
             if mine:
                 self._innovations.take(axis, sum(mine) / len(mine))
-        self._innovations.shaken(float(np.add.reduce(told**2)) / len(told))
+        weighed = by_tilt.T @ np.linalg.solve(spread, np.column_stack((errors, by_tilt)))
+        expected = float(np.trace(weighed[:, 1:]))
+        if expected > 0.0:
+            self._innovations.shaken(float(weighed[:, 0] @ weighed[:, 0]) / expected)
 
     def _add(self, sight: LineSight, rates: Rates, stamp_ns: int, before: Matrix) -> None:
         """A line where it was seen, as wrong as everything by which it was placed; moved by what the frame

@@ -13,8 +13,12 @@ _MOST_RATIO = 9.0
 
 
 class Innovations:
-    """Give `take` each frame's mean innovation along an axis and `shaken` the mean square of all, both in
-    units of their standard deviation."""
+    """Give `take` each frame's mean innovation along an axis, in units of its standard deviation.
+
+    Give `shaken` the square of that part of a frame's innovations e, of covariance S, which a shaken picture
+    makes of all its lines alike, |B' S^-1 e|^2 with B their derivative by roll and pitch, in units of what is
+    expected of it, trace(B' S^-1 B).  It is 1 in the mean where the likelihood has its greatest value; the
+    mean square of all innovations is not, where the noise of single lines is assumed too large."""
 
     def __init__(self, shake_rad: float, bounds_rad: tuple[float, float]) -> None:
         self._bounds_rad = bounds_rad

@@ -158,7 +158,7 @@ class LineTracker:
     @property
     def delay_sigma_s(self) -> float:
         """How well the camera's delay is known."""
-        return self._filter.sigma(DELAY)
+        return self._filter.delay_sigma_s
 
     def learnt(self) -> LearntSensors | None:
         """What is known of the sensors, for the tracker after this one; None before a line was seen, and once

@@ -18,6 +18,8 @@ LEAP, LEAP_PER_S = 0.04, 1.8
 _STEADY_S, _STEADY_SHARE = 0.95, 0.08
 """Widths that never agreed with the height are held against it, too, once they were so long the same share
 of it, within so much on average: a range finder that reads too little from the floor on."""
+_UNMEASURED_M = 0.35
+"""Range finders need not measure less: one that reads its least above a drone that stands is right."""
 _OTHER_S = 2.95
 """The same for a line of another width than those before it, of which no range finder can be the cause."""
 
@@ -62,6 +64,8 @@ class WidthHeights:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
         agrees = abs(told_m / nearest_m - 1.0) < _AGREEING
+        if not agrees and nearest_m < told_m < _UNMEASURED_M:
+            return told_m
         if self._last_m is not None and not agrees:  # it is no better for being nearer to what is wrong
             last_m = self._last_m
             nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))

@@ -143,3 +143,14 @@ def test_false_widths_contradict_nothing_however_many_frames_there_are(fps: floa
     for _ in range(round(4 * fps)):
         assert heights.sees([rng.uniform(0.35, 1.3)], 1.6) == 1.6
         assert heights.share == 1.0
+
+
+def test_a_range_finder_that_reads_its_least_above_a_drone_that_stands_is_right() -> None:
+    """Doubted, it ended the take-off of every eighth flight whose camera saw lines from the floor."""
+    heights = Frames()
+    for _ in range(90):
+        assert heights.sees([0.1], 0.3) == 0.3
+    for n in range(30):
+        climbed_m = 0.1 + 0.025 * n
+        heights.sees([climbed_m], max(climbed_m, 0.3))
+        assert heights.share == pytest.approx(1.0, abs=0.15)
