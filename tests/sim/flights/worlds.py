@@ -2,7 +2,9 @@
 
 python -m tests.sim.flights.worlds --world rough --seeds 7101-7140 flies each seed as `flightd sim` does (with
 `--ideal`: by computed sight, without pictures and sockets, at a tenth of the work) and prints a line for each
-and one for all; exit 1 where a flight was not completed.  `--nodes A2,A3` flies a short route.
+and one for all; exit 1 where a flight was not completed, or not safe.  `--nodes A2,A3` flies a short route,
+`--nodes 3` the first three of the site's own; `--warehouse random` is a random site by each flight's seed.
+`--off-ms=-50,60` configures a camera's delay of 60 ms wrong by so much; `--json FILE` keeps what was found.
 """
 
 from __future__ import annotations
@@ -11,81 +13,177 @@ import argparse
 import json
 import math
 import statistics
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 
+from flightd.app.simulation.judgement import judge_flight
+from flightd.app.simulation.launch import fly
+from flightd.app.simulation.prepare import SimOptions, prepare
+from flightd.app.simulation.sensor_summary import sensor_summary
 from flightd.config.paths import shipped
 from flightd.config.schema import load_config
+from flightd.core.errors import RunError
+from flightd.core.snapshot import Snapshot
+from flightd.core.tracks import SensorEstimate
 from flightd.core.types import Phase
+from flightd.sim.judge.verdict import SAFETY_KINDS
+from flightd.sim.plant.plant_kind import PlantKind
 from flightd.sim.plant.wind import WindParams
+from flightd.sim.random_sites import random_site
+from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.unknowns import WorldKind, unknowns_of
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight, rms_off_line
 
 _LONGEST_S = 900.0
+_TRUE_DELAY_S = 0.06
+_KNOWN_AFTER_S = 20.0
+_DELAY_MS, _ANGLE_DEG = 5.0, 0.3
+"""As well as a delay and an angle have to be known by then."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """One flight; `off_ms` None leaves the camera's delay to the world, empty `nodes` are all."""
+
+    world: WorldKind
+    seed: int
+    nodes: str
+    warehouse: str | None = None
+    plant: PlantKind = PlantKind.OWN
+    off_ms: int | None = None
+
+    def site(self) -> Site:
+        if self.warehouse is None:
+            return load_site(shipped("site-demo.toml"))
+        return random_site(int(self.warehouse.removeprefix("random:")))
+
+    def visits(self) -> tuple[str, ...]:
+        """The nodes by name; none: all of the site's."""
+        if self.nodes.isdecimal():
+            return tuple(self.site().serpentine_route()[: int(self.nodes)])
+        return tuple(self.nodes.split(",")) if self.nodes else ()
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What the table tells of one flight; NaN where it got to nothing that can be measured."""
+    """What the table tells of one flight; NaN where it got to nothing that can be measured.  `errors` are
+    the sensors' estimates less the truth after 20 s in the air: delay (ms), and the greater one of roll and
+    pitch of mount and tilt bias (deg)."""
 
-    seed: int
+    asked: Asked
     completed: bool
     rms_m: float
     hover_p95_m: float
     landed_m: float
     miscounted: int
     faults: str
+    unsafe: bool
     reason: str
+    errors: dict[str, float] = field(default_factory=dict)
 
 
-def flown_by_pictures(world: WorldKind, seed: int, nodes: str) -> Result:
-    """One flight of the whole pipeline, in a process of its own."""
+class _Watch:
+    """Sees what the flight knows of its sensors so long after its take-off began, or at its end."""
+
+    def __init__(self) -> None:
+        self.seen: SensorEstimate | None = None
+        self._up_ns: int | None = None
+
+    def __call__(self, status: Snapshot) -> None:
+        if self._up_ns is None and status.phase is Phase.TAKE_OFF:
+            self._up_ns = status.stamp_ns
+        tracks = status.output.tracks
+        if self._up_ns is None or tracks is None or not tracks.sensors.is_known:
+            return
+        if self.seen is None or (status.stamp_ns - self._up_ns) * 1e-9 < _KNOWN_AFTER_S:
+            self.seen = tracks.sensors
+
+
+def flown_by_pictures(asked: Asked) -> Result:
+    """One flight of the whole pipeline, in lockstep."""
+    settings, scenario = [], Scenario()
+    if asked.nodes:
+        settings.append(f"mission.nodes={','.join(asked.visits())}")
+    if asked.off_ms is not None:
+        drawn_s = unknowns_of(asked.world, asked.seed).camera_delay_s
+        camera = {"capture_delay_s": _TRUE_DELAY_S - drawn_s}
+        scenario = Scenario.model_validate({"camera": camera})
+        settings.append(f"camera.latency_s={_TRUE_DELAY_S + asked.off_ms / 1e3:.3f}")
+    options = SimOptions(
+        seed=asked.seed,
+        world=asked.world,
+        warehouse=asked.warehouse,
+        plant=asked.plant,
+        settings=settings,
+    )
+    watch, ended = _Watch(), ""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "flightd", "sim", "--json", "--out", folder]
-        command += ["--world", str(world), "--seed", str(seed)]
-        command += ["--set", f"mission.nodes={nodes}"] if nodes else []
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST_S, check=False)
-    summary: dict[str, Any] = json.loads(done.stdout)
-
-    def number(key: str) -> float:
-        return math.nan if summary[key] is None else float(summary[key])
-
+        simulation = replace(prepare(options, scenario, Path(folder), lambda _: None), observer=watch)
+        try:
+            fly(simulation)
+        except RunError as err:
+            ended = str(err)
+        judgement = judge_flight(simulation)
+        sensors = sensor_summary(simulation, watch.seen) if watch.seen is not None else {}
+    score = judgement.score
     return Result(
-        seed=seed,
-        completed=summary["mission"] == "completed",
-        rms_m=number("cross_track_rms_m"),
-        hover_p95_m=number("hover_error_p95_m"),
-        landed_m=number("landed_error_m"),
-        miscounted=summary["nodes_miscounted"],
-        faults=" ".join(fault["kind"] for fault in summary["faults"]),
-        reason=summary["reason"],
+        asked=asked,
+        completed=score.mission == "completed",
+        rms_m=_number(score.cross_track_rms_m),
+        hover_p95_m=_number(score.hover_error_p95_m),
+        landed_m=_number(score.landed_error_m),
+        miscounted=score.nodes_miscounted,
+        faults=" ".join(fault.kind for fault in judgement.faults),
+        unsafe=any(fault.kind in SAFETY_KINDS for fault in judgement.faults),
+        reason=ended or score.reason,
+        errors=_errors(sensors),
     )
 
 
-def flown_ideally(world: WorldKind, seed: int, nodes: str) -> Result:
+def _errors(sensors: dict[str, dict[str, float | None]]) -> dict[str, float]:
+    """Estimated less drawn, of what the flight is held to."""
+    if not sensors:
+        return {}
+
+    def off(key: str, scale: float = 1.0) -> float:
+        told, true = sensors["estimated"][key], sensors["drawn"][key]
+        return math.nan if told is None or true is None else scale * (told - true)
+
+    mount = max(abs(off("mount_roll_deg")), abs(off("mount_pitch_deg")))
+    tilt = max(abs(off("tilt_roll_deg")), abs(off("tilt_pitch_deg")))
+    return {"delay_ms": off("delay_to_attitude_s", 1e3), "mount_deg": mount, "tilt_deg": tilt}
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def flown_ideally(asked: Asked) -> Result:
     """One flight by computed sight, with that world's sensors and link."""
-    config, site = load_config(shipped("sim.toml")), load_site(shipped("site-demo.toml"))
-    visits = tuple(nodes.split(",")) if nodes else ()
-    unknowns = unknowns_of(world, seed)
-    wind, painted = unknowns.wind(WindParams(), told=False), unknowns.floor(site, seed)
-    flight = IdealFlight(site, config, visits=visits, seed=seed, wind=wind, unknowns=unknowns, world=painted)
+    config, site = load_config(shipped("sim.toml")), asked.site()
+    unknowns = unknowns_of(asked.world, asked.seed)
+    wind, painted = unknowns.wind(WindParams(), told=False), unknowns.floor(site, asked.seed)
+    flight = IdealFlight(
+        site, config, visits=asked.visits(), seed=asked.seed, wind=wind, unknowns=unknowns, world=painted
+    )
     flown = flight.fly(_LONGEST_S)
     end, pad = flown.truth[-1][1], site.nodes[site.home.node]
     completed = flown.phase is Phase.DONE
     return Result(
-        seed=seed,
+        asked=asked,
         completed=completed,
         rms_m=rms_off_line(flown, painted),
         hover_p95_m=hover_p95_m(flown, painted),
         landed_m=math.hypot(end.x_m - pad.x_m, end.y_m - pad.y_m) if completed else math.nan,
         miscounted=0,
         faults="",
+        unsafe=False,
         reason=flown.reason,
     )
 
@@ -102,16 +200,38 @@ def hover_p95_m(flown: Flown, site: Site) -> float:
 
 def summary_line(results: Sequence[Result]) -> str:
     """All flights in one line; root mean square, mean and worst of what could be measured."""
-    done = sum(result.completed for result in results)
+    done, safe = sum(result.completed for result in results), sum(not result.unsafe for result in results)
     rms = [result.rms_m for result in results if not math.isnan(result.rms_m)]
     p95 = [result.hover_p95_m for result in results if not math.isnan(result.hover_p95_m)]
     landed = [result.landed_m for result in results if not math.isnan(result.landed_m)]
     square = math.sqrt(statistics.fmean(one * one for one in rms)) if rms else math.nan
     return (
-        f"{done} of {len(results)} completed, rms {square:.3f} m (worst {max(rms, default=math.nan):.3f}), "
+        f"{done} of {len(results)} completed, {safe} safe, rms {square:.3f} m "
+        f"(worst {max(rms, default=math.nan):.3f}), "
         f"hover p95 {statistics.fmean(p95) if p95 else math.nan:.3f} m "
         f"(worst {max(p95, default=math.nan):.3f}), landed within {max(landed, default=math.nan):.3f} m, "
-        f"{sum(result.miscounted for result in results)} miscounted"
+        f"{sum(result.miscounted for result in results)} miscounted{_known_line(results)}"
+    )
+
+
+def _known_line(results: Sequence[Result]) -> str:
+    """How many flights knew their sensors after 20 s; empty where no flight tells."""
+    told = [result.errors for result in results if result.errors]
+    if not told:
+        return ""
+    bounds = {"delay_ms": _DELAY_MS, "mount_deg": _ANGLE_DEG, "tilt_deg": _ANGLE_DEG}
+    known = (f"{key} {sum(abs(e[key]) <= most for e in told)}" for key, most in bounds.items())
+    return f"; of {len(told)} known after {_KNOWN_AFTER_S:.0f} s: " + ", ".join(known)
+
+
+def _line(result: Result) -> str:
+    asked, e = result.asked, result.errors
+    outcome = f"{'completed' if result.completed else 'ABORTED'}: {result.reason} {result.faults}"
+    off = "" if asked.off_ms is None else f"{asked.off_ms:+d}"
+    known = f"{e['delay_ms']:+6.1f} {e['mount_deg']:5.2f} {e['tilt_deg']:5.2f}" if e else " " * 18
+    return (
+        f"{asked.seed:>6} {off:>4} {result.rms_m:6.3f} {result.hover_p95_m:6.3f} {result.landed_m:6.3f}"
+        f" {known}  {outcome}"
     )
 
 
@@ -119,20 +239,40 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--world", type=WorldKind, default=WorldKind.ROUGH)
     parser.add_argument("--seeds", default="7101-7110", help="FIRST-LAST")
-    parser.add_argument("--nodes", default="A2,A3", help="route; empty: all nodes")
+    parser.add_argument("--nodes", default="A2,A3", help="route, or so many of the site's; empty: all nodes")
+    parser.add_argument(
+        "--warehouse", help="random (by each flight's seed) or random:SEED; else the demo site"
+    )
+    parser.add_argument("--plant", type=PlantKind, default=PlantKind.OWN)
+    parser.add_argument("--off-ms", help="configured delays less the true one, with commas between them")
     parser.add_argument("--ideal", action="store_true", help="by computed sight")
+    parser.add_argument("--jobs", type=int, default=1, help="so many flights at once")
+    parser.add_argument("--json", type=Path)
     given = parser.parse_args()
     first, _, last = given.seeds.partition("-")
-    fly = flown_ideally if given.ideal else flown_by_pictures
+    offs = [int(off) for off in given.off_ms.split(",")] if given.off_ms else [None]
+    each = [
+        Asked(
+            given.world,
+            seed,
+            given.nodes,
+            f"random:{seed}" if given.warehouse == "random" else given.warehouse,
+            given.plant,
+            off_ms,
+        )
+        for off_ms in offs
+        for seed in range(int(first), int(last or first) + 1)
+    ]
     results = []
-    print(f"{'seed':>6} {'rms':>6} {'p95':>6} {'landed':>6}  outcome")
-    for seed in range(int(first), int(last or first) + 1):
-        one = fly(given.world, seed, given.nodes)
-        results.append(one)
-        outcome = f"{'completed' if one.completed else 'ABORTED'}: {one.reason} {one.faults}"
-        print(f"{seed:>6} {one.rms_m:6.3f} {one.hover_p95_m:6.3f} {one.landed_m:6.3f}  {outcome}", flush=True)
+    print(f"{'seed':>6} {'off':>4} {'rms':>6} {'p95':>6} {'landed':>6}  delay mount  tilt  outcome")
+    with ProcessPoolExecutor(given.jobs, max_tasks_per_child=1) as pool:
+        for result in pool.map(flown_ideally if given.ideal else flown_by_pictures, each):
+            results.append(result)
+            print(_line(result), flush=True)
     print(summary_line(results))
-    return 0 if all(result.completed for result in results) else 1
+    if given.json is not None:
+        given.json.write_text(json.dumps([asdict(result) for result in results], indent=1))
+    return 0 if all(result.completed and not result.unsafe for result in results) else 1
 
 
 if __name__ == "__main__":
