@@ -23,7 +23,7 @@ from flightd.config.schema import Config
 from flightd.guide import pages
 from flightd.mission.safety import hazard_table
 from flightd.sim.judge.verdict import KINDS
-from flightd.sim.unknowns import SPREADS, WorldKind
+from flightd.sim.unknowns import SPREADS, Spread, WorldKind
 from flightd.site.site_tables import SiteFile
 from tools import command_table, reference_tables, safety_case
 from tools.command_help import help_pages
@@ -91,14 +91,24 @@ def _worlds() -> str:
         ("range finder: noise, rms", "range_noise_m", 1e2, "cm"),
         ("range finder: readings lost", "range_dropout", 1e2, "%"),
         ("range finder: measures from", "range_min_m", 1, "m"),
+        ("range finder: follows within", "range_lag_s", 1e3, "ms"),
+        ("range finder: readings by a longer way", "range_echo", 1e2, "%"),
         ("barometer: wanders, rms", "baro_m", 1, "m"),
         ("hover thrust off by up to", "hover_share", 1e2, "%"),
+        ("drag, battery's capacity: off by up to", "body_share", 1e2, "%"),
+        ("motors: most thrust on a full battery, less as it sags", "thrust_to_weight", 1, "times the weight"),
         ("air: gusts, rms", "gust_mps", 1, "m/s"),
+        ("air: thrown back right beside floor and racks, rms", "wash_mps", 1, "m/s"),
         ("racks: light on each level of a front, from", "darkest_face", 1, "times the usual"),
         ("racks: light on each level of a front, up to", "lightest_face", 1, "times the usual"),
     )
+
+    def told(spread: Spread, name: str, factor: float, unit: str) -> str:
+        value = getattr(spread, name)
+        return "not limited" if value is None else f"{value * factor:g} {unit}"
+
     lines += [
-        f"| {what} | {getattr(usual, name) * factor:g} {unit} | {getattr(rough, name) * factor:g} {unit} |"
+        f"| {what} | {told(usual, name, factor, unit)} | {told(rough, name, factor, unit)} |"
         for what, name, factor, unit in rows
     ]
     return "\n".join(lines) + "\n"

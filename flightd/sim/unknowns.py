@@ -17,6 +17,7 @@ from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.floor.misplaced_lines import misplaced
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.wash import Wash
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.face_light import drawn_light
@@ -75,6 +76,18 @@ class Unknowns:
     gust_rms_mps: float = _GUST_RMS_MPS
     face_light: tuple[float, float] = (1.0, 1.0)
     """Between which the light on each level of each rack front is drawn, the usual one being 1."""
+    drag_share: float = 1.0
+    capacity_share: float = 1.0
+    """Of the battery."""
+    sags: bool = False
+    """The battery's voltage takes thrust."""
+    thrust_to_weight: float | None = None
+    """The most that the motors lift; None: all that is asked for."""
+    wash_mps: float = 0.0
+    """Rms of the air that comes back right beside floor and racks."""
+    range_lag_s: float = 0.0
+    range_echo: float = 0.0
+    """Share of readings that came back by a longer way."""
 
     def camera(self, configured: SimCamera) -> SimCamera:
         """The down camera as it really is."""
@@ -120,6 +133,8 @@ class Unknowns:
             range_dropout=self.range_dropout,
             range_min_m=max(self.range_min_m, configured.range_min_m),
             baro_wander_m=self.baro_wander_m,
+            range_lag_s=self.range_lag_s,
+            range_echo=self.range_echo,
         )
 
     def radio(self, configured: RadioParams) -> tuple[RadioParams, RadioParams]:
@@ -136,7 +151,18 @@ class Unknowns:
 
     def airframe(self, configured: AirframeParams) -> AirframeParams:
         """The airframe as it really is."""
-        return replace(configured, hover_collective=configured.hover_collective * self.hover_share)
+        return replace(
+            configured,
+            hover_collective=configured.hover_collective * self.hover_share,
+            drag_per_s=configured.drag_per_s * self.drag_share,
+            battery_capacity_ah=configured.battery_capacity_ah * self.capacity_share,
+            sags=self.sags,
+            thrust_to_weight=self.thrust_to_weight,
+        )
+
+    def wash(self, site: Site, seed: int) -> Wash | None:
+        """The air that floor and racks throw back; None where there is none."""
+        return Wash(self.wash_mps, site.shelves, seed) if self.wash_mps else None
 
 
 NOTHING = Unknowns()
@@ -173,6 +199,11 @@ class Spread:
     gust_mps: float
     darkest_face: float
     lightest_face: float
+    body_share: float
+    thrust_to_weight: float | None
+    wash_mps: float
+    range_lag_s: float
+    range_echo: float
 
 
 SPREADS = {
@@ -203,6 +234,11 @@ SPREADS = {
         gust_mps=_GUST_RMS_MPS,
         darkest_face=0.75,
         lightest_face=1.05,
+        body_share=0.10,
+        thrust_to_weight=None,
+        wash_mps=0.0,
+        range_lag_s=0.04,
+        range_echo=0.0,
     ),
     WorldKind.ROUGH: Spread(
         delay_s=0.050,
@@ -231,6 +267,11 @@ SPREADS = {
         gust_mps=0.5,
         darkest_face=0.35,
         lightest_face=1.8,
+        body_share=0.25,
+        thrust_to_weight=1.7,
+        wash_mps=0.4,
+        range_lag_s=0.10,
+        range_echo=0.02,
     ),
 }
 
@@ -240,6 +281,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     if kind is WorldKind.IDEAL:
         return NOTHING
     most, rng = SPREADS[kind], random.Random(f"unknowns {kind} {seed}")
+    body = random.Random(f"body {kind} {seed}")
 
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
@@ -272,6 +314,13 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         readout_s=within(most.readout_s),
         gust_rms_mps=most.gust_mps,
         face_light=(most.darkest_face, most.lightest_face),
+        drag_share=1.0 + body.uniform(-most.body_share, most.body_share),
+        capacity_share=1.0 + body.uniform(-most.body_share, most.body_share),
+        sags=most.thrust_to_weight is not None,
+        thrust_to_weight=most.thrust_to_weight,
+        wash_mps=most.wash_mps,
+        range_lag_s=most.range_lag_s,
+        range_echo=most.range_echo,
     )
 
 

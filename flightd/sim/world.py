@@ -140,6 +140,7 @@ class World:
             y_m=start.y_m,
             yaw_rad=start.yaw_rad,
             battery_frac=spec.battery_frac,
+            wash=spec.unknowns.wash(spec.site, spec.seed),
         )
         self.vehicle: VehiclePeer
         lamp: Callable[[], float] = float

@@ -15,11 +15,14 @@ import numpy as np
 
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.wash import Wash
 from flightd.sim.plant.wind import Wind, WindParams
 
 _CHARGE = (0.0, 0.05, 0.1, 0.2, 0.5, 0.8, 1.0)
 _CELL_V = (3.3, 3.5, 3.65, 3.73, 3.84, 4.02, 4.2)
 """A lithium polymer cell's voltage at rest by its charge."""
+_FREE_LIFT, _LEAST_AUTHORITY = 0.3, 0.15
+"""With this share of the greatest lift to spare all torque is there; with none the mixer keeps some of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,10 @@ class AirframeParams:
     battery_resistance_ohm: float = 0.02
     hover_current_a: float = 14.0
     idle_current_a: float = 0.6
+    sags: bool = False
+    """Thrust goes with the square of the battery's voltage, hovering on a full one being as configured."""
+    thrust_to_weight: float | None = None
+    """The most that a full battery lifts; near it no motor has much left to turn the airframe by."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.hover_collective < 1.0:
@@ -75,9 +82,10 @@ class Airframe:
         y_m: float = 0.0,
         yaw_rad: float = 0.0,
         battery_frac: float = 1.0,
+        wash: Wash | None = None,
     ) -> None:
         self.params = params or AirframeParams()
-        self.wind = Wind(wind or WindParams(), seed)
+        self.wind, self.wash = Wind(wind or WindParams(), seed), wash
         self.x_m, self.y_m, self.height_m = x_m, y_m, self.params.rest_height_m
         self.vx_mps = self.vy_mps = self.climb_mps = 0.0
         self.roll_rad = self.pitch_rad = 0.0
@@ -94,8 +102,33 @@ class Airframe:
     def battery_v(self) -> float:
         """Terminal voltage under the present load."""
         p = self.params
-        open_v = p.battery_cells * float(np.interp(self.battery_frac, _CHARGE, _CELL_V))
-        return open_v - p.battery_resistance_ohm * self.current_a
+        return self._open_v(self.battery_frac) - p.battery_resistance_ohm * self.current_a
+
+    def _open_v(self, charge: float) -> float:
+        return self.params.battery_cells * float(np.interp(charge, _CHARGE, _CELL_V))
+
+    @property
+    def air_mps(self) -> tuple[float, float, float]:
+        """Velocity of the air round it, map frame and upwards."""
+        wind, wash = self.wind, self.wash
+        if wash is None:
+            return wind.x_mps, wind.y_mps, wind.up_mps
+        return wind.x_mps + wash.x_mps, wind.y_mps + wash.y_mps, wind.up_mps + wash.up_mps
+
+    def lift(self, collective: float) -> float:
+        """What a collective lifts on this battery, in weights."""
+        p = self.params
+        share = self._battery_share()
+        lift = share * collective / p.hover_collective
+        return lift if p.thrust_to_weight is None else min(lift, share * p.thrust_to_weight)
+
+    def _battery_share(self) -> float:
+        """Of a collective's thrust on a full battery."""
+        p = self.params
+        if not p.sags:
+            return 1.0
+        full_v = self._open_v(1.0) - p.battery_resistance_ohm * p.hover_current_a
+        return (self.battery_v / full_v) ** 2
 
     @property
     def tilt_cos(self) -> float:
@@ -103,11 +136,16 @@ class Airframe:
 
     def step(self, dt_s: float, command: AirframeCommand) -> None:
         """Advance by `dt_s` (a few milliseconds) under `command`."""
-        self.wind.step(dt_s)
+        self._blow(dt_s)
         self._spin(dt_s, command)
         self._turn(dt_s, command)
         self._move(dt_s)
         self._drain(dt_s, motors=command.motors)
+
+    def _blow(self, dt_s: float) -> None:
+        self.wind.step(dt_s)
+        if self.wash is not None:
+            self.wash.step(dt_s, self.x_m, self.y_m, self.height_m)
 
     def kinematics(self, stamp_ns: int) -> Kinematics:
         """The present truth, stamped; rates are those of the body axes."""
@@ -139,7 +177,7 @@ class Airframe:
         p = self.params
         standing = self.on_floor and self.collective < 0.8 * p.hover_collective
         roll_target, pitch_target = (0.0, 0.0) if standing else (command.roll_rad, command.pitch_rad)
-        omega, limit = p.attitude_bandwidth_radps, p.attitude_accel_max_radps2
+        omega, limit = p.attitude_bandwidth_radps, p.attitude_accel_max_radps2 * self._authority()
         stiffness, damping = omega * omega, 2.0 * p.attitude_damping * omega
 
         push = stiffness * (roll_target - self.roll_rad) - damping * self.roll_speed_radps
@@ -157,9 +195,17 @@ class Airframe:
         self.yaw_speed_radps += (turn - self.yaw_speed_radps) * min(1.0, dt_s / p.yaw_rate_lag_s)
         self.yaw_rad = wrap_pi(self.yaw_rad + self.yaw_speed_radps * dt_s)
 
+    def _authority(self) -> float:
+        """The share of the usual torque that is left beside the lift: a motor that saturates has no more."""
+        most = self.params.thrust_to_weight
+        if most is None:
+            return 1.0
+        left = 1.0 - self.collective / (self.params.hover_collective * most)
+        return min(max(_LEAST_AUTHORITY, left / _FREE_LIFT), 1.0)
+
     def _move(self, dt_s: float) -> None:
         p = self.params
-        lift = GRAVITY_MPS2 * self.collective / p.hover_collective
+        lift = GRAVITY_MPS2 * self.lift(self.collective)
         sin_roll, cos_roll = math.sin(self.roll_rad), math.cos(self.roll_rad)
         sin_pitch, cos_pitch = math.sin(self.pitch_rad), math.cos(self.pitch_rad)
         sin_yaw, cos_yaw = math.sin(self.yaw_rad), math.cos(self.yaw_rad)
@@ -169,10 +215,10 @@ class Airframe:
         if self.on_floor and up <= 0.0:
             self._rub(dt_s, -up)
             return
-        wind, drag = self.wind, p.drag_per_s
-        self.vx_mps += (forward * cos_yaw - right * sin_yaw - drag * (self.vx_mps - wind.x_mps)) * dt_s
-        self.vy_mps += (forward * sin_yaw + right * cos_yaw - drag * (self.vy_mps - wind.y_mps)) * dt_s
-        self.climb_mps += (up - drag * (self.climb_mps - wind.up_mps)) * dt_s
+        (air_x, air_y, air_up), drag = self.air_mps, p.drag_per_s
+        self.vx_mps += (forward * cos_yaw - right * sin_yaw - drag * (self.vx_mps - air_x)) * dt_s
+        self.vy_mps += (forward * sin_yaw + right * cos_yaw - drag * (self.vy_mps - air_y)) * dt_s
+        self.climb_mps += (up - drag * (self.climb_mps - air_up)) * dt_s
         self.x_m += self.vx_mps * dt_s
         self.y_m += self.vy_mps * dt_s
         self.height_m += self.climb_mps * dt_s

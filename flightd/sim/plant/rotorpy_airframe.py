@@ -20,6 +20,7 @@ from flightd.core.errors import UnavailableError
 from flightd.core.extras import missing_extra
 from flightd.core.geometry import GRAVITY_MPS2, heading_rotation, level_from_body, wrap_pi
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
+from flightd.sim.plant.wash import Wash
 from flightd.sim.plant.wind import WindParams
 
 _YAW_AHEAD_RAD = 0.3
@@ -41,6 +42,7 @@ class RotorpyAirframe(Airframe):
         y_m: float = 0.0,
         yaw_rad: float = 0.0,
         battery_frac: float = 1.0,
+        wash: Wash | None = None,
     ) -> None:
         configured = params or AirframeParams()
         multirotor, quad = _rotorpy()
@@ -59,6 +61,7 @@ class RotorpyAirframe(Airframe):
             y_m=y_m,
             yaw_rad=yaw_rad,
             battery_frac=battery_frac,
+            wash=wash,
         )
         self._rotors_radps = np.zeros(4)
         self._body_radps = np.zeros(3)
@@ -71,11 +74,11 @@ class RotorpyAirframe(Airframe):
 
     def step(self, dt_s: float, command: AirframeCommand) -> None:
         """Advance by `dt_s` (a few milliseconds) under `command`."""
-        self.wind.step(dt_s)
+        self._blow(dt_s)
         on = command.motors and self.battery_frac > 0
         wanted = min(max(command.collective, 0.0), 1.0) if on else 0.0
-        thrust_n = self._mass_kg * GRAVITY_MPS2 * wanted / self.params.hover_collective
         weight_n = self._mass_kg * GRAVITY_MPS2
+        thrust_n = weight_n * self.lift(wanted)
         if self.on_floor and thrust_n <= weight_n:
             self._stand(dt_s, thrust_n)
         else:
@@ -95,12 +98,13 @@ class RotorpyAirframe(Airframe):
 
     def _fly(self, dt_s: float, command: AirframeCommand, thrust_n: float) -> None:
         turn = min(max(wrap_pi(command.yaw_rad - self.yaw_rad), -_YAW_AHEAD_RAD), _YAW_AHEAD_RAD)
+        air_x, air_y, air_up = self.air_mps
         state = {
             "x": np.array([self.x_m, -self.y_m, self.height_m]),
             "v": np.array([self.vx_mps, -self.vy_mps, self.climb_mps]),
             "q": _quaternion(_attitude(self.roll_rad, self.pitch_rad, self.yaw_rad)),
             "w": self._body_radps,
-            "wind": np.array([self.wind.x_mps, -self.wind.y_mps, self.wind.up_mps]),
+            "wind": np.array([air_x, -air_y, air_up]),
             "rotor_speeds": self._rotors_radps,
         }
         wanted = _attitude(command.roll_rad, command.pitch_rad, self.yaw_rad + turn)

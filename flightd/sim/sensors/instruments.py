@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.steel_field import SteelField
+
+
+class Goods(NamedTuple):
+    """What stands on the floor below the drone's way: a box in the map frame, and its height."""
+
+    x0_m: float
+    y0_m: float
+    x1_m: float
+    y1_m: float
+    height_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +56,17 @@ class SensorParams:
     range_noise_m: float = 0.005
     range_step_m: float = 0.01
     range_dropout: float = 0.005
+    range_lag_s: float = 0.0
+    """Time constant with which it follows the distance."""
+    range_echo: float = 0.0
+    """Share of readings that came back by a longer way."""
+    goods: Sequence[Goods] = ()
+
+
+_LEAST_COS = 0.3
+"""Leaned over further, nothing comes back."""
+_LONGER_WAY = 1.15, 1.8
+"""An echo by racks or goods comes back by so much of the way."""
 
 
 @dataclass(slots=True)
@@ -95,6 +118,7 @@ class Sensors:
         self._roll_wander = self._pitch_wander = self._baro_wander = self._climb_error = 0.0
         self.roll_rad = self.pitch_rad = self.yaw_rad = 0.0
         self.height_m = self.climb_mps = 0.0
+        self._below_m: float | None = None
 
     @property
     def told_climb_mps(self) -> float:
@@ -151,6 +175,10 @@ class Sensors:
         above_m = airframe.height_m - airframe.params.rest_height_m
         self.height_m = above_m + self._baro_wander + self._drifted_m
         self.climb_mps = airframe.climb_mps + self._climb_error + self.fault.climb_drift_mps
+        if p.range_lag_s:
+            below_m = self._to_below_m(airframe)
+            last_m = below_m if self._below_m is None else self._below_m
+            self._below_m = last_m + (below_m - last_m) * min(dt_s / p.range_lag_s, 1.0)
 
     def _leak(self, dt_s: float, airframe: Airframe) -> None:
         """Rotors push along the body's axis, so the accelerometers feel level, but for the drag."""
@@ -160,8 +188,8 @@ class Sensors:
         if leak_s is None or airframe.on_floor or self.aided:
             return
         cos, sin = math.cos(airframe.yaw_rad), math.sin(airframe.yaw_rad)
-        wind, share = airframe.wind, airframe.params.drag_per_s / GRAVITY_MPS2
-        east, south = airframe.vx_mps - wind.x_mps, airframe.vy_mps - wind.y_mps
+        (air_x, air_y, _), share = airframe.air_mps, airframe.params.drag_per_s / GRAVITY_MPS2
+        east, south = airframe.vx_mps - air_x, airframe.vy_mps - air_y
         felt_pitch, felt_roll = -share * (cos * east + sin * south), share * (-sin * east + cos * south)
         part = dt_s / leak_s
         self._roll_leak -= part * (airframe.roll_rad + self._roll_leak - felt_roll)
@@ -187,10 +215,23 @@ class Sensors:
         if self.fault.range_stuck_m is not None:
             return self.fault.range_stuck_m + self._rng.uniform(0.0, self.fault.range_swing_m)
         tilt_cos = airframe.tilt_cos
-        if tilt_cos < 0.3 or self._rng.random() < p.range_dropout or self.fault.range_lost:
+        if tilt_cos < _LEAST_COS or self._rng.random() < p.range_dropout or self.fault.range_lost:
             return 0.0
-        true_m = airframe.height_m / tilt_cos + self._rng.gauss(0.0, p.range_noise_m)
+        below_m = self._to_below_m(airframe) if self._below_m is None else self._below_m
+        true_m = below_m + self._rng.gauss(0.0, p.range_noise_m)
+        if p.range_echo and self._rng.random() < p.range_echo:
+            true_m *= self._rng.uniform(*_LONGER_WAY)
         distance = true_m * self.fault.range_share + self.fault.range_m
         if not p.range_min_m <= distance <= p.range_max_m:
             return 0.0
         return round(distance / p.range_step_m) * p.range_step_m
+
+    def _to_below_m(self, airframe: Airframe) -> float:
+        """Along the body's z axis to what is below: the floor, or the highest goods."""
+        x_m, y_m = airframe.x_m, airframe.y_m
+        stands_m = max((g.height_m for g in self.params.goods if _holds(g, x_m, y_m)), default=0.0)
+        return (airframe.height_m - stands_m) / max(airframe.tilt_cos, _LEAST_COS)
+
+
+def _holds(goods: Goods, x_m: float, y_m: float) -> bool:
+    return goods.x0_m <= x_m <= goods.x1_m and goods.y0_m <= y_m <= goods.y1_m

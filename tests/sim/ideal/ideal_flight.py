@@ -152,7 +152,8 @@ class IdealFlight:
         self._now_ns = 1_000_000_000_000
         unknown = unknowns or Unknowns()
         frame = unknown.airframe(airframe or AirframeParams())
-        self.airframe = Airframe(frame, wind=wind, seed=seed, x_m=x_m, y_m=y_m)
+        wash = unknown.wash(world, seed)
+        self.airframe = Airframe(frame, wind=wind, seed=seed, x_m=x_m, y_m=y_m, wash=wash)
         self.sensors = Sensors(unknown.sensors(SensorParams()), seed)
         camera = unknown.camera(SimCamera(config.camera.lens(), config.camera.mount()))
         self._eye = IdealEye(world, camera.lens, camera.mount, errors, seed)
