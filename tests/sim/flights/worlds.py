@@ -15,10 +15,13 @@ import math
 import statistics
 import sys
 import tempfile
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.launch import fly
@@ -28,8 +31,10 @@ from flightd.config.paths import shipped
 from flightd.config.schema import load_config
 from flightd.core.errors import RunError
 from flightd.core.snapshot import Snapshot
+from flightd.core.topics import Topic
 from flightd.core.tracks import SensorEstimate
-from flightd.core.types import Phase
+from flightd.core.types import Attitude, Phase
+from flightd.replay.log import read_log
 from flightd.sim.judge.verdict import SAFETY_KINDS
 from flightd.sim.plant.plant_kind import PlantKind
 from flightd.sim.plant.wind import WindParams
@@ -89,10 +94,12 @@ class Result:
 
 
 class _Watch:
-    """Sees what the flight knows of its sensors so long after its take-off began, or at its end."""
+    """Sees what the flight knows of its sensors so long after its take-off began, or at its end, and what
+    attitude it was told in the second before."""
 
     def __init__(self) -> None:
         self.seen: SensorEstimate | None = None
+        self.told = deque[Attitude](maxlen=50)
         self._up_ns: int | None = None
 
     def __call__(self, status: Snapshot) -> None:
@@ -103,6 +110,19 @@ class _Watch:
             return
         if self.seen is None or (status.stamp_ns - self._up_ns) * 1e-9 < _KNOWN_AFTER_S:
             self.seen = tracks.sensors
+            if status.vehicle is not None:
+                self.told.append(status.vehicle.attitude)
+
+    def tilt_error_deg(self, truth_log: Path) -> tuple[float, float]:
+        """By how much roll and pitch were told too large, on average."""
+        truth = read_log(truth_log, {Topic.TRUTH}).entries
+        rows = [entry.message for entry in truth if isinstance(entry.message, dict)]
+        stamps = [row["stamp_ns"] for row in rows]
+        at = [told.stamp_ns for told in self.told]
+        roll, pitch = (np.interp(at, stamps, [row[key] for row in rows]) for key in ("roll_rad", "pitch_rad"))
+        off_roll = statistics.fmean(told.roll_rad for told in self.told) - float(np.mean(roll))
+        off_pitch = statistics.fmean(told.pitch_rad for told in self.told) - float(np.mean(pitch))
+        return math.degrees(off_roll), math.degrees(off_pitch)
 
 
 def flown_by_pictures(asked: Asked) -> Result:
@@ -130,7 +150,10 @@ def flown_by_pictures(asked: Asked) -> Result:
         except RunError as err:
             ended = str(err)
         judgement = judge_flight(simulation)
-        sensors = sensor_summary(simulation, watch.seen) if watch.seen is not None else {}
+        errors = {}
+        if watch.seen is not None:
+            tilt_deg = watch.tilt_error_deg(simulation.truth_log)
+            errors = _errors(sensor_summary(simulation, watch.seen), tilt_deg)
     score = judgement.score
     return Result(
         asked=asked,
@@ -142,21 +165,20 @@ def flown_by_pictures(asked: Asked) -> Result:
         faults=" ".join(fault.kind for fault in judgement.faults),
         unsafe=any(fault.kind in SAFETY_KINDS for fault in judgement.faults),
         reason=ended or score.reason,
-        errors=_errors(sensors),
+        errors=errors,
     )
 
 
-def _errors(sensors: dict[str, dict[str, float | None]]) -> dict[str, float]:
-    """Estimated less drawn, of what the flight is held to."""
-    if not sensors:
-        return {}
+def _errors(sensors: dict[str, dict[str, float | None]], tilt_deg: tuple[float, float]) -> dict[str, float]:
+    """Estimated less true, of what the flight is held to; the tilt's error wanders, and is that of then."""
 
     def off(key: str, scale: float = 1.0) -> float:
         told, true = sensors["estimated"][key], sensors["drawn"][key]
         return math.nan if told is None or true is None else scale * (told - true)
 
     mount = max(abs(off("mount_roll_deg")), abs(off("mount_pitch_deg")))
-    tilt = max(abs(off("tilt_roll_deg")), abs(off("tilt_pitch_deg")))
+    told = sensors["estimated"]["tilt_roll_deg"], sensors["estimated"]["tilt_pitch_deg"]
+    tilt = max(abs((value or 0.0) - true) for value, true in zip(told, tilt_deg, strict=True))
     return {"delay_ms": off("delay_to_attitude_s", 1e3), "mount_deg": mount, "tilt_deg": tilt}
 
 
