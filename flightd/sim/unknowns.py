@@ -21,6 +21,7 @@ from flightd.sim.plant.wash import Wash
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.face_light import drawn_light
+from flightd.sim.sensors.cheap_camera import FAITHFUL, CheapParams
 from flightd.sim.sensors.instruments import SensorParams
 from flightd.sim.sensors.optics import SimCamera
 from flightd.site.site import Site
@@ -88,6 +89,10 @@ class Unknowns:
     range_lag_s: float = 0.0
     range_echo: float = 0.0
     """Share of readings that came back by a longer way."""
+    exposure_lag_s: float = 0.0
+    """Time constant of the down camera's automatic exposure; 0: it has none."""
+    flicker: float = 0.0
+    """Share of the floor's light that beats with the mains, row by row; 0: as its appearance has it."""
 
     def camera(self, configured: SimCamera) -> SimCamera:
         """The down camera as it really is."""
@@ -105,6 +110,10 @@ class Unknowns:
             jitter_s=configured.jitter_s + self.camera_jitter_s,
             readout_s=max(configured.readout_s + self.readout_s, 0.0),
         )
+
+    def cheap(self, *, told: bool) -> CheapParams:
+        """What the down camera does by itself; a floor whose look somebody has `told` is seen as it is."""
+        return FAITHFUL if told else CheapParams(self.exposure_lag_s, self.flicker)
 
     def floor(self, configured: Site, seed: int) -> Site:
         """The floor as it is painted; as far from its map as it can be where lines come too close."""
@@ -204,6 +213,10 @@ class Spread:
     wash_mps: float
     range_lag_s: float
     range_echo: float
+    quickest_exposure_s: float
+    slowest_exposure_s: float
+    least_flicker: float
+    most_flicker: float
 
 
 SPREADS = {
@@ -239,6 +252,10 @@ SPREADS = {
         wash_mps=0.0,
         range_lag_s=0.04,
         range_echo=0.0,
+        quickest_exposure_s=0.1,
+        slowest_exposure_s=0.1,
+        least_flicker=0.01,
+        most_flicker=0.01,
     ),
     WorldKind.ROUGH: Spread(
         delay_s=0.050,
@@ -272,6 +289,10 @@ SPREADS = {
         wash_mps=0.4,
         range_lag_s=0.10,
         range_echo=0.02,
+        quickest_exposure_s=0.5,
+        slowest_exposure_s=1.5,
+        least_flicker=0.05,
+        most_flicker=0.15,
     ),
 }
 
@@ -287,6 +308,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         return rng.uniform(-limit, limit)
 
     uneven_s = within(most.uneven_s)
+    light = random.Random(f"exposure {kind} {seed}")
     return Unknowns(
         kind=kind,
         camera_delay_s=within(most.delay_s),
@@ -321,6 +343,8 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         wash_mps=most.wash_mps,
         range_lag_s=most.range_lag_s,
         range_echo=most.range_echo,
+        exposure_lag_s=light.uniform(most.quickest_exposure_s, most.slowest_exposure_s),
+        flicker=light.uniform(most.least_flicker, most.most_flicker),
     )
 
 

@@ -9,7 +9,7 @@ import asyncio
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Literal, Protocol
 
@@ -39,7 +39,8 @@ from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.faults import FaultListener, WorldFaults, bare_boxes
-from flightd.sim.sensors.camera import CameraPeer
+from flightd.sim.sensors.camera import CameraPeer, PictureMaker
+from flightd.sim.sensors.cheap_camera import FAITHFUL, CheapCamera, CheapParams
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
 from flightd.sim.unknowns import NOTHING, Shaken, Unknowns
@@ -70,7 +71,7 @@ class WorldSpec:
     `faults` go wrong on the way.  A MAVLink autopilot is set up as the shipped parameter file says, but for
     `parameters`; its clock runs `clock_ppm` fast, its range finder measures from `range_least_m` on, and one
     beside it reads `second_range_m` more (None: there is none).  `unknowns` are what no configuration
-    tells of it all."""
+    tells of it all; `cheap` is what the down camera does by itself."""
 
     site: Site
     seed: int
@@ -95,6 +96,7 @@ class WorldSpec:
     faults: tuple[Fault, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     unknowns: Unknowns = NOTHING
+    cheap: CheapParams = FAITHFUL
     plant: PlantKind = PlantKind.OWN
 
 
@@ -246,7 +248,10 @@ def _down_camera(
 ) -> CameraPeer:
     bare = bare_boxes(spec.faults, spec.site)
     camera = spec.unknowns.camera(spec.camera)
-    make = partial(Renderer, spec.site, camera, spec.appearance, spec.seed, bare)
+    look = replace(spec.appearance, flicker=0.0) if spec.cheap.flicker else spec.appearance
+    make: Callable[[], PictureMaker] = partial(Renderer, spec.site, camera, look, spec.seed, bare)
+    if spec.cheap != FAITHFUL:
+        make = partial(CheapCamera, make, camera, spec.cheap, spec.seed)
     seed, address = f"camera {spec.seed}", spec.camera_address
     shaken = Shaken(spec.unknowns.shake_rad, spec.seed)
     return CameraPeer(

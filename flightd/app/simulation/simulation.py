@@ -101,6 +101,7 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         truth_url=simulation.truth_url,
         faults=scenario.fault,
         unknowns=simulation.unknowns,
+        cheap=simulation.unknowns.cheap(told=scenario.floor.tells_appearance),
         plant=simulation.plant,
     )
 

@@ -197,6 +197,11 @@ class FloorScenario(Section):
         pads = (replace(pad, offset_m=(pad.offset_m[0] + dx_m, pad.offset_m[1] + dy_m)) for pad in site.pads)
         return replace(site, pads=tuple(pads))
 
+    @property
+    def tells_appearance(self) -> bool:
+        """Whether the scenario says how the floor looks; else the world adds to it."""
+        return "appearance" in self.model_fields_set
+
     def surface(self) -> Appearance:
         return preset(self.appearance)
 

@@ -40,6 +40,8 @@ def test_what_is_drawn_stays_within_its_world_and_reaches_what_it_is_of(kind: Wo
         assert abs(math.degrees(camera.mount.roll_rad)) <= most.mount_deg
         assert abs(camera.lens.fx_px / SimCamera().lens.fx_px - 1.0) <= most.focal_share
         assert one.sensors(SensorParams()).leak_s == most.leak_s
+        assert most.quickest_exposure_s <= one.exposure_lag_s <= most.slowest_exposure_s
+        assert most.least_flicker <= one.flicker <= most.most_flicker
         assert 0.0 <= one.sensors(SensorParams()).compass_rad <= math.radians(most.compass_deg)
         down_s, up_s = one.path_s
         assert down_s + up_s == pytest.approx(2.0 * most.path_s)
