@@ -63,7 +63,8 @@ def at(seq: int) -> Kinematics:
 
 def row_light(picture: Image) -> NDArray[np.float64]:
     rows: NDArray[np.float64] = picture.astype(float).mean(axis=(1, 2))
-    return rows / rows.mean()
+    rows /= rows.mean()
+    return rows
 
 
 def test_a_dark_patch_makes_pictures_too_dark_and_what_follows_too_bright_for_a_while() -> None:
