@@ -103,6 +103,10 @@ def _worlds() -> str:
         ("motors: most thrust on a full battery, less as it sags", "thrust_to_weight", 1, "times the weight"),
         ("air: gusts, rms", "gust_mps", 1, "m/s"),
         ("air: thrown back right beside floor and racks, rms", "wash_mps", 1, "m/s"),
+        ("floor: paint that is missing", "paint_gone", 1e2, "% of its length"),
+        ("floor: paint on which pallets and drains lie", "paint_covered", 1e2, "% of its length"),
+        ("floor: lines that no map has", "false_lines", 1e2, "% of the painted length"),
+        ("floor: wear, dirt, mirrored lamps and blur, from `default` to `harsh`", "worn_look", 1e2, "%"),
         ("racks: light on each level of a front, from", "darkest_face", 1, "times the usual"),
         ("racks: light on each level of a front, up to", "lightest_face", 1, "times the usual"),
     )

@@ -39,12 +39,22 @@ class Appearance:
     motion_blur: bool = True
     exposure: float = 1.0
 
+    def towards(self, other: Appearance, share: float) -> Appearance:
+        """This floor by a `share` of the way to the paint, dirt, lamps and lens of another."""
+        changed = {
+            name: (1.0 - share) * getattr(self, name) + share * getattr(other, name) for name in _NEGLECTED
+        }
+        return replace(self, **changed)
+
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
             if not 0.0 <= value <= 50.0:
                 raise ValueError(f"appearance {field.name} {value} outside 0..50")
 
+
+_NEGLECTED = ("wear", "ragged_m", "dirt", "stains", "tyre_marks", "lamps", "glare", "soft_px")
+"""What years without care change of a hall and of a lens."""
 
 DEFAULT = Appearance()
 

@@ -13,8 +13,10 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from flightd.core.errors import InputError
+from flightd.sim.appearance import HARSH, Appearance
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.floor.misplaced_lines import misplaced
+from flightd.sim.floor.paint_damage import PaintDamage, drawn_damage
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wash import Wash
@@ -93,6 +95,14 @@ class Unknowns:
     """Time constant of the down camera's automatic exposure; 0: it has none."""
     flicker: float = 0.0
     """Share of the floor's light that beats with the mains, row by row; 0: as its appearance has it."""
+    paint_gone: float = 0.0
+    """Share of the painted length from which the paint is gone."""
+    paint_covered: float = 0.0
+    """Share of it on which pallets and drains lie."""
+    false_lines: float = 0.0
+    """Length of the stripes that no map has, as a share of it."""
+    worn_look: float = 0.0
+    """How far the floor looks worn, from as configured (0) to the harsh appearance (1)."""
 
     def camera(self, configured: SimCamera) -> SimCamera:
         """The down camera as it really is."""
@@ -121,6 +131,14 @@ class Unknowns:
             with suppress(InputError):
                 return misplaced(configured, share * self.map_error_m, seed)
         return configured
+
+    def paint_damage(self, painted: Site, seed: int) -> PaintDamage:
+        """What the hall did to the floor as it was `painted`."""
+        return drawn_damage(painted, self.paint_gone, self.paint_covered, self.false_lines, seed)
+
+    def look(self, configured: Appearance, *, told: bool) -> Appearance:
+        """How the floor looks; a look that somebody has `told` stands."""
+        return configured if told or not self.worn_look else configured.towards(HARSH, self.worn_look)
 
     def racks(self, configured: RackAppearance, site: Site, seed: int) -> RackAppearance:
         """The racks in the light that really falls on them; what was told of it stands."""
@@ -217,6 +235,10 @@ class Spread:
     slowest_exposure_s: float
     least_flicker: float
     most_flicker: float
+    paint_gone: float
+    paint_covered: float
+    false_lines: float
+    worn_look: float
 
 
 SPREADS = {
@@ -256,6 +278,10 @@ SPREADS = {
         slowest_exposure_s=0.1,
         least_flicker=0.01,
         most_flicker=0.01,
+        paint_gone=0.01,
+        paint_covered=0.0,
+        false_lines=0.0,
+        worn_look=0.0,
     ),
     WorldKind.ROUGH: Spread(
         delay_s=0.050,
@@ -293,6 +319,10 @@ SPREADS = {
         slowest_exposure_s=1.5,
         least_flicker=0.05,
         most_flicker=0.15,
+        paint_gone=0.05,
+        paint_covered=0.03,
+        false_lines=0.03,
+        worn_look=0.6,
     ),
 }
 
@@ -345,6 +375,10 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         range_echo=most.range_echo,
         exposure_lag_s=light.uniform(most.quickest_exposure_s, most.slowest_exposure_s),
         flicker=light.uniform(most.least_flicker, most.most_flicker),
+        paint_gone=most.paint_gone,
+        paint_covered=most.paint_covered,
+        false_lines=most.false_lines,
+        worn_look=most.worn_look,
     )
 
 

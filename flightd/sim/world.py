@@ -28,6 +28,7 @@ from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.autopilot.shipped_parameters import shipped_parameters
 from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement
+from flightd.sim.floor.paint_damage import PaintDamage
 from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.charge_pads import ChargePads, PadService
@@ -133,6 +134,7 @@ class World:
         self._clock = clock
         self._recorder = recorder
         self._unknowns, self._floor = spec.unknowns, site_toml(spec.site)
+        self._damage = spec.unknowns.paint_damage(spec.site, spec.seed)
         start = _placement(spec)
         airframe = airframe_kind(spec.plant)(
             spec.unknowns.airframe(AirframeParams(battery_capacity_ah=spec.battery_ah)),
@@ -160,7 +162,7 @@ class World:
 
         serves = spec.pads != PadService() and not spec.truth_url
         self._charge_pads = ChargePads(spec.site, airframe, spec.pads) if serves else None
-        self._cameras = {"camera": _down_camera(spec, self.vehicle, clock, show, hold)}
+        self._cameras = {"camera": _down_camera(spec, self._damage, self.vehicle, clock, show, hold)}
         if own_front is not None:
             self._cameras["ardrone-front-camera"] = own_front
         if spec.front is not None:
@@ -180,7 +182,8 @@ class World:
         is known then, so that it can be drawn).  UnavailableError as for `open`; RunError when a peer fails:
         the world ends with it."""
         await self.open()
-        told = Document(json.dumps(asdict(self._unknowns), indent=1))
+        drawn = {**asdict(self._unknowns), "paint_damage": asdict(self._damage)}
+        told = Document(json.dumps(drawn, indent=1))
         self._recorder.record(Topic.UNKNOWNS, self._clock.now_ns(), told)
         self._recorder.record(Topic.MAP, self._clock.now_ns(), Document(self._floor))
         try:
@@ -241,15 +244,16 @@ def _autopilot(spec: WorldSpec, airframe: Airframe, clock: Clock) -> AutopilotPe
 
 def _down_camera(
     spec: WorldSpec,
+    damage: PaintDamage,
     vehicle: VehiclePeer,
     clock: Clock,
     show: Callable[[Image, int], None] | None,
     hold: Hold,
 ) -> CameraPeer:
-    bare = bare_boxes(spec.faults, spec.site)
+    damage = replace(damage, gaps=damage.gaps + bare_boxes(spec.faults, spec.site))
     camera = spec.unknowns.camera(spec.camera)
     look = replace(spec.appearance, flicker=0.0) if spec.cheap.flicker else spec.appearance
-    make: Callable[[], PictureMaker] = partial(Renderer, spec.site, camera, look, spec.seed, bare)
+    make: Callable[[], PictureMaker] = partial(Renderer, spec.site, camera, look, spec.seed, damage)
     if spec.cheap != FAITHFUL:
         make = partial(CheapCamera, make, camera, spec.cheap, spec.seed)
     seed, address = f"camera {spec.seed}", spec.camera_address

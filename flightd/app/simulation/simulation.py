@@ -88,7 +88,7 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         start_offset_m=scenario.vehicle.start_offset_m,
         camera=replace(scenario.camera.camera(), mount=config.camera.mount()),
         front=_front(simulation, ports.front_camera),
-        appearance=scenario.floor.surface(),
+        appearance=simulation.unknowns.look(scenario.floor.surface(), told=scenario.floor.tells_appearance),
         wind=simulation.unknowns.wind(scenario.wind.params(), told=scenario.wind.tells_gusts),
         battery_frac=scenario.vehicle.battery,
         battery_ah=scenario.vehicle.battery_ah,

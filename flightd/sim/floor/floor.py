@@ -6,6 +6,7 @@ as the map does.  Colour is worked out as reflectance times light and stored wit
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
@@ -16,19 +17,23 @@ from flightd.core.paint import paint_srgb
 from flightd.core.types import Image
 from flightd.sim.appearance import Appearance
 from flightd.sim.floor.lighting import Lighting
+from flightd.sim.floor.paint_damage import UNDAMAGED, PaintDamage, Stripe, stroke_box
 from flightd.sim.floor.printed_markers import FloorSigns
-from flightd.sim.floor.texture import NoiseField, Patch
+from flightd.sim.floor.texture import Box, NoiseField, Patch
 from flightd.sim.floor.wear_marks import FloorMarks
-from flightd.site.site import PadSign, PaintedLine, Side, Site
+from flightd.site.site import PadSign, Side, Site
 
 Floats: TypeAlias = NDArray[np.float32]
-Box: TypeAlias = tuple[float, float, float, float]
 
 _CONCRETE_SRGB = (152, 150, 144)
 _MAT_SRGB = (58, 58, 61)
 _UPRIGHT_SRGB = (40, 62, 110)
 _WOOD_SRGB = (148, 127, 101)
 _BOARD_M = 0.145
+_STEEL_SRGB = (118, 122, 124)
+_MESH_M, _BAR_M = 0.033, 0.003
+"""Pitch of a grating, and half of a bar's width."""
+_STEEL_SHARE = 1.0 - (1.0 - 2.0 * _BAR_M / _MESH_M) ** 2
 _GAMMA_STEPS = 4096
 
 
@@ -51,23 +56,28 @@ class Floor:
     """Paints patches of one warehouse's floor; the same patch always looks the same."""
 
     def __init__(
-        self, site: Site, look: Appearance, lighting: Lighting, seed: int, bare: Sequence[Box] = ()
+        self,
+        site: Site,
+        look: Appearance,
+        lighting: Lighting,
+        seed: int,
+        damage: PaintDamage = UNDAMAGED,
     ) -> None:
-        """Within the `bare` boxes there is no paint."""
         self._look = look
-        self._bare = list(bare)
+        self._gaps, self._gratings = damage.gaps, damage.gratings
         self._lighting = lighting
         self._noise = NoiseField(seed)
         self._marks = FloorMarks(site, look, seed)
         self._signs = FloorSigns(site)
-        self._strokes = [_stroke_box(line) for line in site.lines]
+        self._strokes: list[Box | Stripe] = [*map(stroke_box, site.lines), *damage.false_lines]
         self._mats = [
             (x_m - half, y_m - half, x_m + half, y_m + half)
             for pad in site.pads
             if pad.sign is PadSign.MAT
             for (x_m, y_m), half in ((site.pad_centre(pad), pad.size_m / 2),)
         ]
-        self._uprights, self._pallets = _shelf_feet(site) if look.concrete > 0.0 else ([], [])
+        self._uprights, pallets = _shelf_feet(site) if look.concrete > 0.0 else ([], [])
+        self._pallets = [*pallets, *damage.pallets]
         self._paint = _linear(paint_srgb(site.line_colour))
         self._gamma = _gamma_table()
 
@@ -80,11 +90,12 @@ class Floor:
             _lay(colour, _linear(_MAT_SRGB) * rubber[..., None], mats)
         self._lay_paint(colour, patch, mats)
         self._signs.lay(colour, patch)
+        self._lay_gratings(colour, patch)
         shade = self._marks.shade(patch)
         if mats is not None:  # the mat lies on the marks
             shade += (1.0 - shade) * mats
         colour *= shade[..., None]
-        self._lay_shelf_feet(colour, patch)
+        self._lay_pallets_and_uprights(colour, patch)
         colour *= self._lighting.on(patch)[..., None]
         np.clip(colour, 0.0, 1.0, out=colour)
         picture: Image = self._gamma[(colour * np.float32(_GAMMA_STEPS - 1)).astype(np.uint16)]
@@ -107,7 +118,20 @@ class Floor:
         base[..., 2] *= 1.0 + strength * tint
         return base
 
-    def _lay_shelf_feet(self, colour: Floats, patch: Patch) -> None:
+    def _lay_gratings(self, colour: Floats, patch: Patch) -> None:
+        """Drains: galvanised bars over dark holes, too fine to be told apart in coarse texels."""
+        cover = self._cover(patch, self._gratings, None)
+        if cover is None:
+            return
+        x = (patch.xs() + np.float32(patch.x_m)) / _MESH_M % 1.0
+        y = (patch.xs() + np.float32(patch.y_m)) / _MESH_M % 1.0
+        from_bar_m = np.minimum(np.abs(x - 0.5)[None, :], np.abs(y - 0.5)[:, None]) * _MESH_M
+        bars = np.clip((_BAR_M - from_bar_m) / patch.texel_m + 0.5, 0.0, 1.0)
+        fine = min(max(2.0 - 4.0 * patch.texel_m / _MESH_M, 0.0), 1.0)
+        steel = 0.12 + 0.88 * (fine * bars + (1.0 - fine) * _STEEL_SHARE)
+        _lay(colour, _linear(_STEEL_SRGB) * steel[..., None].astype(np.float32), cover)
+
+    def _lay_pallets_and_uprights(self, colour: Floats, patch: Patch) -> None:
         wood = self._cover(patch, self._pallets, None)
         if wood is not None:
             # boards into the shelf, as pallets are stored: their own tone, dark gaps between, the grain
@@ -136,9 +160,9 @@ class Floor:
             if mats is not None:  # the mat is newer than the floor
                 gone *= 1.0 - 0.8 * mats
             cover *= 1.0 - gone
-        bare = self._cover(patch, self._bare, None)
-        if bare is not None:
-            cover *= 1.0 - bare
+        gaps = self._cover(patch, self._gaps, None)
+        if gaps is not None:
+            cover *= 1.0 - gaps
         paint = np.broadcast_to(self._paint, colour.shape).copy()
         if self._look.dirt > 0.0:
             film = self._noise.mix(patch, "film", {1.3: 0.3, 0.3: 0.3, 0.07: 0.25, 0.02: 0.2, 0.005: 0.25})
@@ -147,20 +171,19 @@ class Floor:
             paint += (_linear(_CONCRETE_SRGB) * 0.55 - paint) * (0.6 * grey)[..., None]
         colour += (paint - colour) * cover[..., None]
 
-    def _cover(self, patch: Patch, boxes: list[Box], ragged: Floats | None) -> Floats | None:
-        """Share of each texel inside any of the boxes, their edges moved outward by `ragged` metres;
-        None when no box is near."""
+    def _cover(self, patch: Patch, shapes: Sequence[Box | Stripe], ragged: Floats | None) -> Floats | None:
+        """Share of each texel inside any of the shapes, their edges moved outward by `ragged` metres;
+        None when no shape is near."""
         cover: Floats | None = None
-        xs, texel = patch.xs(), np.float32(patch.texel_m)
+        texel = np.float32(patch.texel_m)
         margin = 0.02 + patch.texel_m
-        for x0, y0, x1, y1 in boxes:
+        for shape in shapes:
+            x0, y0, x1, y1 = shape.box() if isinstance(shape, Stripe) else shape
             if x1 < patch.x_m - margin or x0 > patch.x_m + patch.side_m + margin:
                 continue
             if y1 < patch.y_m - margin or y0 > patch.y_m + patch.side_m + margin:
                 continue
-            x = np.minimum(xs - np.float32(x0 - patch.x_m), np.float32(x1 - patch.x_m) - xs)
-            y = np.minimum(xs - np.float32(y0 - patch.y_m), np.float32(y1 - patch.y_m) - xs)
-            inside = np.minimum(x[None, :], y[:, None])
+            inside = _inside_stripe(patch, shape) if isinstance(shape, Stripe) else _inside_box(patch, shape)
             if ragged is not None:
                 inside = inside + ragged
             share = np.clip(inside / texel + np.float32(0.5), 0.0, 1.0)
@@ -176,12 +199,25 @@ def _lay(colour: Floats, reflectance: Floats, cover: Floats) -> None:
     colour += (reflectance - colour) * cover[..., None]
 
 
-def _stroke_box(line: PaintedLine) -> Box:
-    """The painted rectangle; strokes run along x or y, square at the ends given."""
-    half = line.width_m / 2
-    if line.y0_m == line.y1_m:
-        return line.x0_m, line.y0_m - half, line.x1_m, line.y0_m + half
-    return line.x0_m - half, line.y0_m, line.x0_m + half, line.y1_m
+def _inside_box(patch: Patch, box: Box) -> Floats:
+    """How far each texel's centre is within the box, metres; negative outside."""
+    x0, y0, x1, y1 = box
+    xs = patch.xs()
+    x = np.minimum(xs - np.float32(x0 - patch.x_m), np.float32(x1 - patch.x_m) - xs)
+    y = np.minimum(xs - np.float32(y0 - patch.y_m), np.float32(y1 - patch.y_m) - xs)
+    inside: Floats = np.minimum(x[None, :], y[:, None])
+    return inside
+
+
+def _inside_stripe(patch: Patch, stripe: Stripe) -> Floats:
+    """As `_inside_box`."""
+    xs = patch.xs()
+    x = (xs + np.float32(patch.x_m - stripe.x_m))[None, :]
+    y = (xs + np.float32(patch.y_m - stripe.y_m))[:, None]
+    c, s = np.float32(math.cos(stripe.turn_rad)), np.float32(math.sin(stripe.turn_rad))
+    along = np.float32(stripe.length_m / 2) - np.abs(x * c + y * s)
+    inside: Floats = np.minimum(along, np.float32(stripe.width_m / 2) - np.abs(y * c - x * s))
+    return inside
 
 
 def _shelf_feet(site: Site) -> tuple[list[Box], list[Box]]:

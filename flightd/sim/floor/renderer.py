@@ -8,7 +8,6 @@ light that depends on the picture (vignetting, mirrored lamps, the drone's own s
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,8 +18,9 @@ from numpy.typing import NDArray
 from flightd.core.camera_view import Viewpoint
 from flightd.core.types import Image
 from flightd.sim.appearance import DEFAULT, Appearance
-from flightd.sim.floor.floor import Box, Floor
+from flightd.sim.floor.floor import Floor
 from flightd.sim.floor.lighting import Lighting
+from flightd.sim.floor.paint_damage import UNDAMAGED, PaintDamage
 from flightd.sim.floor.tiles import Ahead, TiledFloor
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.camera_effects import Sensor, blur_kernel
@@ -58,14 +58,13 @@ class Renderer:
         camera: SimCamera,
         appearance: Appearance = DEFAULT,
         seed: int = 0,
-        bare: Sequence[Box] = (),
+        damage: PaintDamage = UNDAMAGED,
     ) -> None:
-        """Within the `bare` boxes (x0, y0, x1, y1 on the map) the floor has no paint."""
         self._camera = camera
         self._look = appearance
         self._rays = RayTable(camera.lens)
         self._lighting = Lighting(site, appearance, seed)
-        self._tiles = TiledFloor(Floor(site, appearance, self._lighting, seed, bare))
+        self._tiles = TiledFloor(Floor(site, appearance, self._lighting, seed, damage))
         self._sensor = Sensor(camera.lens, appearance, seed)
 
     def render(

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float32]
+Box: TypeAlias = tuple[float, float, float, float]
+"""An upright rectangle of floor: x0, y0, x1, y1 on the map."""
 
 _PERIOD = 256
 _STEPS_PER_CELL = 4

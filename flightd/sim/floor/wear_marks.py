@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.sim.appearance import Appearance
-from flightd.sim.floor.texture import NoiseField, Patch
+from flightd.sim.floor.texture import Box, NoiseField, Patch
 from flightd.site.site import Site
 
 Floats: TypeAlias = NDArray[np.float32]
-Box: TypeAlias = tuple[float, float, float, float]
 
 MARGIN_M = 4.0
 """Floor with marks around the site; beyond it the concrete is bare."""

@@ -15,7 +15,7 @@ from flightd.core.errors import InputError
 from flightd.core.topics import Topic
 from flightd.ports import Clock, Recorder
 from flightd.sim.autopilot.autopilot import AutopilotPeer
-from flightd.sim.floor.floor import Box
+from flightd.sim.floor.texture import Box
 from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import Wind, WindParams

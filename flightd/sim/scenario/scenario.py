@@ -199,7 +199,7 @@ class FloorScenario(Section):
 
     @property
     def tells_appearance(self) -> bool:
-        """Whether the scenario says how the floor looks; else the world adds to it."""
+        """Whether the scenario says how the floor looks; else the world does."""
         return "appearance" in self.model_fields_set
 
     def surface(self) -> Appearance:
