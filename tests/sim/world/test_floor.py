@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from flightd.core.distortion import undistorted
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
-from flightd.sim.appearance import DEFAULT, HARSH, Appearance, preset
+from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance, preset
 from flightd.sim.floor.floor import Floor
 from flightd.sim.floor.lighting import Lighting
+from flightd.sim.floor.paint_damage import UNDAMAGED, PaintDamage, Stripe
 from flightd.sim.floor.texture import Patch
 from flightd.sim.sensors.camera_effects import blur_kernel
 from flightd.sim.sensors.optics import wide_lens
@@ -23,8 +24,14 @@ from flightd.site.site_file import load_site
 DEMO = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
 
 
-def floor(look: Appearance) -> Floor:
-    return Floor(DEMO, look, Lighting(DEMO, look, 4), 4)
+def floor(look: Appearance, damage: PaintDamage = UNDAMAGED) -> Floor:
+    return Floor(DEMO, look, Lighting(DEMO, look, 4), 4, damage)
+
+
+def tone(painted: Floor, x_m: float, y_m: float) -> tuple[float, float]:
+    """Brightness, and how yellow it is (red less blue), of 4 cm of floor about a point."""
+    blue, green, red = painted.paint(Patch(x_m - 0.02, y_m - 0.02, 0.001, 40)).astype(float).mean(axis=(0, 1))
+    return (blue + green + red) / 3, red - blue
 
 
 @pytest.mark.parametrize("look", [DEFAULT, HARSH])
@@ -99,3 +106,42 @@ def test_appearances_have_names_and_limits() -> None:
         Appearance(noise=-1.0)
     with pytest.raises(ValueError, match="wear"):
         Appearance(wear=math.nan)
+
+
+def test_gaps_show_concrete_and_covers_what_lies_there() -> None:
+    damage = PaintDamage(
+        gaps=((2.0, -0.1, 2.4, 0.1),), pallets=((5.0, -0.4, 5.8, 0.8),), gratings=((3.0, -0.08, 4.2, 0.08),)
+    )
+    whole, damaged = floor(DEFAULT), floor(DEFAULT, damage)
+    for on_line in (1.0, 2.2, 3.3, 5.3):
+        assert tone(whole, on_line, 0.0)[1] > 100.0
+    concrete, _ = tone(whole, 2.2, 0.3)
+    assert tone(damaged, 1.0, 0.0) == tone(whole, 1.0, 0.0)
+    bare, yellow = tone(damaged, 2.2, 0.0)
+    assert bare == pytest.approx(concrete, abs=25.0)
+    assert yellow < 25.0
+    wood, brown = tone(damaged, 5.3, 0.0)
+    assert 25.0 < brown < 80.0
+    assert wood < concrete
+    steel, grey = tone(damaged, 3.3, 0.0)
+    assert steel < 0.65 * concrete
+    assert abs(grey) < 15.0
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 90.0, 80.0, -10.0])
+def test_a_false_line_is_painted_like_a_true_one(turn_deg: float) -> None:
+    stripe = Stripe(3.6, 0.6, 0.8, 0.06, math.radians(turn_deg))
+    damaged = floor(CLEAN, PaintDamage(false_lines=(stripe,)))
+    along = math.cos(stripe.turn_rad), math.sin(stripe.turn_rad)
+    for at_m in (-0.37, 0.0, 0.37):
+        seen = tone(damaged, 3.6 + at_m * along[0], 0.6 + at_m * along[1])
+        assert seen == pytest.approx(tone(damaged, 3.6, 0.0), abs=1.0)
+    for at_m, beside_m in ((0.0, 0.06), (0.0, -0.06), (0.43, 0.0), (-0.43, 0.0)):
+        x_m, y_m = 3.6 + at_m * along[0] - beside_m * along[1], 0.6 + at_m * along[1] + beside_m * along[0]
+        assert tone(damaged, x_m, y_m) == tone(floor(CLEAN), x_m, y_m)
+
+
+def test_a_grating_keeps_its_tone_from_afar() -> None:
+    grated = floor(CLEAN, PaintDamage(gratings=((2.0, -1.0, 4.0, 1.0),)))
+    tones = [float(grated.paint(Patch(2.2, -0.6, 0.64 / n, n)).mean()) for n in (640, 160, 40)]
+    assert max(tones) - min(tones) < 25.0

@@ -9,9 +9,11 @@ import pytest
 from flightd.app.simulation.prepare import SimOptions
 from flightd.config.paths import shipped
 from flightd.core.errors import InputError
+from flightd.sim.appearance import DEFAULT, HARSH
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.racks.appearance import RackAppearance
 from flightd.sim.racks.face_light import check_names
+from flightd.sim.scenario.scenario import FloorScenario
 from flightd.sim.sensors.instruments import SensorParams
 from flightd.sim.sensors.optics import SimCamera
 from flightd.sim.unknowns import NOTHING, SPREADS, WorldKind, unknowns_of
@@ -45,6 +47,29 @@ def test_what_is_drawn_stays_within_its_world_and_reaches_what_it_is_of(kind: Wo
         assert 0.0 <= one.sensors(SensorParams()).compass_rad <= math.radians(most.compass_deg)
         down_s, up_s = one.path_s
         assert down_s + up_s == pytest.approx(2.0 * most.path_s)
+
+
+@pytest.mark.parametrize(
+    ("kind", "drawn"),
+    [(WorldKind.USUAL, (-0.000789, 1.018342, 0.003262)), (WorldKind.ROUGH, (0.005667, 0.822846, 0.011211))],
+)
+def test_a_seed_draws_what_it_drew_before_there_was_more_to_draw(
+    kind: WorldKind, drawn: tuple[float, float, float]
+) -> None:
+    one = unknowns_of(kind, 7)
+    assert (one.camera_delay_s, one.hover_share, one.readout_s) == pytest.approx(drawn, abs=1e-6)
+
+
+def test_the_rough_floor_looks_worn_where_nobody_says_how_it_looks() -> None:
+    for kind in (WorldKind.IDEAL, WorldKind.USUAL):
+        assert unknowns_of(kind, 3).look(DEFAULT, told=False) == DEFAULT
+    worn = unknowns_of(WorldKind.ROUGH, 3).look(DEFAULT, told=False)
+    for name in ("wear", "dirt", "glare", "soft_px"):
+        assert getattr(DEFAULT, name) < getattr(worn, name) < getattr(HARSH, name)
+    assert (worn.noise, worn.exposure, worn.sun) == (DEFAULT.noise, DEFAULT.exposure, DEFAULT.sun)
+    named = FloorScenario(appearance="default")
+    assert not FloorScenario().tells_appearance
+    assert unknowns_of(WorldKind.ROUGH, 3).look(named.surface(), told=named.tells_appearance) == DEFAULT
 
 
 def test_lines_lie_beside_their_places_by_what_the_world_allows_and_not_more() -> None:
