@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -28,8 +28,9 @@ from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.autopilot.shipped_parameters import shipped_parameters
 from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement
-from flightd.sim.floor.paint_damage import PaintDamage
+from flightd.sim.floor.paint_damage import PALLET_HEIGHT_M, PaintDamage
 from flightd.sim.floor.renderer import Renderer
+from flightd.sim.floor.texture import Box
 from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.charge_pads import ChargePads, PadService
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
@@ -42,7 +43,7 @@ from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.faults import FaultListener, WorldFaults, bare_boxes
 from flightd.sim.sensors.camera import CameraPeer, PictureMaker
 from flightd.sim.sensors.cheap_camera import FAITHFUL, CheapCamera, CheapParams
-from flightd.sim.sensors.instruments import SensorParams, Sensors
+from flightd.sim.sensors.instruments import Goods, SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
 from flightd.sim.unknowns import NOTHING, Shaken, Unknowns
 from flightd.site.site import Site
@@ -155,7 +156,7 @@ class World:
         elif spec.vehicle == "ardrone":
             self.vehicle, show, own_front = _ardrone(spec, airframe, clock, hold)
         else:
-            self.vehicle = autopilot = _autopilot(spec, airframe, clock)
+            self.vehicle = autopilot = _autopilot(spec, airframe, self._damage.pallets, clock)
 
             def lamp() -> float:
                 return _LAMP if autopilot.lamp_lit else 0.0
@@ -223,12 +224,13 @@ def _placement(spec: WorldSpec) -> Placement:
     return Placement(x_m + spec.start_offset_m[0], y_m + spec.start_offset_m[1], spec.start_yaw_rad)
 
 
-def _autopilot(spec: WorldSpec, airframe: Airframe, clock: Clock) -> AutopilotPeer:
+def _autopilot(spec: WorldSpec, airframe: Airframe, pallets: Sequence[Box], clock: Clock) -> AutopilotPeer:
     (port,) = spec.vehicle_ports
     is_px4 = spec.vehicle == "px4"
     known = PX4_PARAMETERS if is_px4 else COPTER_PARAMETERS
     parameters = {**shipped_parameters("px4" if is_px4 else "ardupilot", known), **spec.parameters}
     down, up = spec.unknowns.radio(spec.radio)
+    goods = [Goods(*box, PALLET_HEIGHT_M) for box in pallets]
     config = PeerConfig(
         port=port,
         seed=spec.seed,
@@ -236,7 +238,7 @@ def _autopilot(spec: WorldSpec, airframe: Airframe, clock: Clock) -> AutopilotPe
         radio_up=up,
         parameters=parameters,
         clock_ppm=spec.clock_ppm,
-        sensors=spec.unknowns.sensors(SensorParams(range_min_m=spec.range_least_m)),
+        sensors=spec.unknowns.sensors(SensorParams(range_min_m=spec.range_least_m, goods=goods)),
         second_range_m=spec.second_range_m,
     )
     return Px4Peer(clock, airframe, config) if is_px4 else ArduCopterPeer(clock, airframe, config)

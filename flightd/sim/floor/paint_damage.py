@@ -16,6 +16,8 @@ _EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
 _PAD_CLEAR_M = 0.5
 _PALLET_CLEAR_M = 0.6
 _PALLET_M = (1.2, 0.8)
+PALLET_HEIGHT_M = 0.144
+"""A flat pallet's of 1.2 by 0.8 m (EN 13698-1)."""
 _RAGGED_M = 0.02
 """By how much a gap is wider than its line: a line's edge is not straight."""
 _ALONGSIDE_M = 0.15

@@ -8,6 +8,7 @@ import statistics
 import pytest
 
 from flightd.config.paths import shipped
+from flightd.sim.floor.paint_damage import PALLET_HEIGHT_M
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.plant.wash import Wash
 from flightd.sim.plant.wind import WindParams
@@ -110,3 +111,14 @@ def test_what_the_plant_of_a_world_draws_leaves_all_else_as_it_was() -> None:
     assert 0.75 <= min(shares) < 0.8
     assert 1.2 < max(shares) <= 1.25
     assert rough.airframe(AirframeParams()).drag_per_s == rough.drag_share * AirframeParams().drag_per_s
+
+
+def test_a_pallet_that_lies_on_the_paint_is_below_the_range_finder() -> None:
+    site = load_site(shipped("site-demo.toml"))
+    kinds = {seed: unknowns_of(WorldKind.ROUGH, seed).paint_damage(site, seed).pallets for seed in range(8)}
+    seed, (pallet, *_) = next((seed, found) for seed, found in kinds.items() if found)
+    goods = [Goods(*pallet, PALLET_HEIGHT_M)]
+    airframe = Airframe(wind=CALM, x_m=(pallet[0] + pallet[2]) / 2, y_m=(pallet[1] + pallet[3]) / 2)
+    airframe.height_m = 1.6
+    sensors = Sensors(SensorParams(range_noise_m=0.0, range_dropout=0.0, goods=goods), seed)
+    assert sensors.range_m(airframe) == pytest.approx(1.6 - 0.144, abs=0.006)
