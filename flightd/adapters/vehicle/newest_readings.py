@@ -6,6 +6,7 @@ import math
 from collections import deque
 from typing import Protocol
 
+from flightd.adapters.vehicle.leaping_heights import LeapingHeights
 from flightd.adapters.vehicle.range_finders import RangeFinders, RangeSample
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
@@ -57,6 +58,7 @@ class NewestReadings:
         self._attitudes: deque[Attitude] = deque(maxlen=_ATTITUDES_MAX)
         self._range_m, self._range_ns = math.nan, 0
         self._finders = RangeFinders(range_finder)
+        self._leaping = LeapingHeights()
         self._climb_mps, self._climb_ns = math.nan, 0
         self._landed, self._landed_ns = LandedState.UNKNOWN, 0
         self._battery_frac = math.nan
@@ -148,7 +150,9 @@ class NewestReadings:
             tilt_cos = 1.0
             if self._attitude is not None:
                 tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
-            self._range_m, self._range_ns = sample.distance_m * max(tilt_cos, 0.0), stamp_ns
+            height_m = sample.distance_m * max(tilt_cos, 0.0)
+            if self._leaping.believes(height_m, stamp_ns) or not self.armed:
+                self._range_m, self._range_ns = height_m, stamp_ns
         elif sample.is_below and self._is_low(sample.least_m, now_ns):
             self._range_m, self._range_ns = sample.least_m, stamp_ns
 
