@@ -94,7 +94,7 @@ class Unknowns:
     exposure_lag_s: float = 0.0
     """Time constant of the down camera's automatic exposure; 0: it has none."""
     flicker: float = 0.0
-    """Share of the floor's light that beats with the mains, row by row; 0: as its appearance has it."""
+    """Share of the floor's grey level that beats with the mains, row by row; 0: as its appearance has it."""
     paint_gone: float = 0.0
     """Share of the painted length from which the paint is gone."""
     paint_covered: float = 0.0

@@ -30,7 +30,6 @@ from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement
 from flightd.sim.floor.paint_damage import PALLET_HEIGHT_M, PaintDamage
 from flightd.sim.floor.renderer import Renderer
-from flightd.sim.floor.texture import Box
 from flightd.sim.plant.airframe import Airframe, AirframeParams
 from flightd.sim.plant.charge_pads import ChargePads, PadService
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
@@ -147,6 +146,7 @@ class World:
             battery_frac=spec.battery_frac,
             wash=spec.unknowns.wash(spec.site, spec.seed),
         )
+        goods = [Goods(*box, PALLET_HEIGHT_M) for box in self._damage.pallets]
         self.vehicle: VehiclePeer
         lamp: Callable[[], float] = float
         show: Callable[[Image, int], None] | None = None
@@ -154,9 +154,9 @@ class World:
         if spec.truth_url:
             self.vehicle = ExternalVehicle(spec.truth_url, clock, start)
         elif spec.vehicle == "ardrone":
-            self.vehicle, show, own_front = _ardrone(spec, airframe, clock, hold)
+            self.vehicle, show, own_front = _ardrone(spec, airframe, goods, clock, hold)
         else:
-            self.vehicle = autopilot = _autopilot(spec, airframe, self._damage.pallets, clock)
+            self.vehicle = autopilot = _autopilot(spec, airframe, goods, clock)
 
             def lamp() -> float:
                 return _LAMP if autopilot.lamp_lit else 0.0
@@ -224,13 +224,12 @@ def _placement(spec: WorldSpec) -> Placement:
     return Placement(x_m + spec.start_offset_m[0], y_m + spec.start_offset_m[1], spec.start_yaw_rad)
 
 
-def _autopilot(spec: WorldSpec, airframe: Airframe, pallets: Sequence[Box], clock: Clock) -> AutopilotPeer:
+def _autopilot(spec: WorldSpec, airframe: Airframe, goods: Sequence[Goods], clock: Clock) -> AutopilotPeer:
     (port,) = spec.vehicle_ports
     is_px4 = spec.vehicle == "px4"
     known = PX4_PARAMETERS if is_px4 else COPTER_PARAMETERS
     parameters = {**shipped_parameters("px4" if is_px4 else "ardupilot", known), **spec.parameters}
     down, up = spec.unknowns.radio(spec.radio)
-    goods = [Goods(*box, PALLET_HEIGHT_M) for box in pallets]
     config = PeerConfig(
         port=port,
         seed=spec.seed,
@@ -298,7 +297,7 @@ def _leaves(failure: Exception) -> Iterator[Exception]:
 
 
 def _ardrone(
-    spec: WorldSpec, airframe: Airframe, clock: Clock, hold: Hold
+    spec: WorldSpec, airframe: Airframe, goods: Sequence[Goods], clock: Clock, hold: Hold
 ) -> tuple[VehiclePeer, Callable[[Image, int], None], CameraPeer]:
     """The emulated AR.Drone, where the floor's pictures go, and its own front camera.  UnavailableError
     without its video library."""
@@ -309,7 +308,7 @@ def _ardrone(
         from flightd.sim.ardrone.video import VideoChannel  # noqa: PLC0415
     except ModuleNotFoundError as err:
         raise missing_extra("ardrone", "simulating an AR.Drone") from err
-    drone = Drone(airframe, Sensors(spec.unknowns.sensors(SensorParams()), seed=spec.seed))
+    drone = Drone(airframe, Sensors(spec.unknowns.sensors(SensorParams(goods=goods)), seed=spec.seed))
     ports = DronePorts("127.0.0.1", *spec.vehicle_ports)
     server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
     appearance = spec.front.appearance if spec.front is not None else RackAppearance()

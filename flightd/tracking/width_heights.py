@@ -65,7 +65,7 @@ class WidthHeights:
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
         agrees = abs(told_m / nearest_m - 1.0) < _AGREEING
         if not agrees and nearest_m < told_m < _UNMEASURED_M:
-            return told_m
+            return told_m / self._believed_share
         if self._last_m is not None and not agrees:  # it is no better for being nearer to what is wrong
             last_m = self._last_m
             nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))

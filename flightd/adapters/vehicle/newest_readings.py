@@ -6,7 +6,7 @@ import math
 from collections import deque
 from typing import Protocol
 
-from flightd.adapters.vehicle.leaping_heights import LeapingHeights
+from flightd.adapters.vehicle.height_leap_gate import HeightLeapGate
 from flightd.adapters.vehicle.range_finders import RangeFinders, RangeSample
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
@@ -58,7 +58,7 @@ class NewestReadings:
         self._attitudes: deque[Attitude] = deque(maxlen=_ATTITUDES_MAX)
         self._range_m, self._range_ns = math.nan, 0
         self._finders = RangeFinders(range_finder)
-        self._leaping = LeapingHeights()
+        self._leap_gate = HeightLeapGate()
         self._climb_mps, self._climb_ns = math.nan, 0
         self._landed, self._landed_ns = LandedState.UNKNOWN, 0
         self._battery_frac = math.nan
@@ -151,7 +151,7 @@ class NewestReadings:
             if self._attitude is not None:
                 tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
             height_m = sample.distance_m * max(tilt_cos, 0.0)
-            if self._leaping.believes(height_m, stamp_ns) or not self.armed:
+            if self._leap_gate.accepts(height_m, sample.distance_m, stamp_ns) or not self.armed:
                 self._range_m, self._range_ns = height_m, stamp_ns
         elif sample.is_below and self._is_low(sample.least_m, now_ns):
             self._range_m, self._range_ns = sample.least_m, stamp_ns

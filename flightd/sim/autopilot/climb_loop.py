@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from flightd.core.geometry import GRAVITY_MPS2
 
+_MOST_TRIM_MPS2 = 4.0
+"""As much as a battery that is nearly empty takes, for which real autopilots scale their thrust."""
+
 
 @dataclass(frozen=True, slots=True)
 class ClimbGains:
@@ -47,7 +50,7 @@ class ClimbLoop:
             lag_m = self._target_m - height_m
         error_mps = self._wanted_mps + g.position_per_s * lag_m - speed_mps
         self._trim_mps2 += g.integral_per_s2 * error_mps * dt_s
-        self._trim_mps2 = min(max(self._trim_mps2, -2.0), 2.0)
+        self._trim_mps2 = min(max(self._trim_mps2, -_MOST_TRIM_MPS2), _MOST_TRIM_MPS2)
         accel = g.velocity_per_s * error_mps + self._trim_mps2
         collective = g.hover_guess * (1.0 + accel / GRAVITY_MPS2) / max(tilt_cos, 0.5)
         return min(max(collective, 0.0), 1.0)

@@ -140,7 +140,7 @@ class Airframe:
         self._spin(dt_s, command)
         self._turn(dt_s, command)
         self._move(dt_s)
-        self._drain(dt_s, motors=command.motors)
+        self._drain(dt_s, self.lift(self.collective), motors=command.motors)
 
     def _blow(self, dt_s: float) -> None:
         self.wind.step(dt_s)
@@ -242,9 +242,9 @@ class Airframe:
         self.x_m += self.vx_mps * dt_s
         self.y_m += self.vy_mps * dt_s
 
-    def _drain(self, dt_s: float, *, motors: bool) -> None:
+    def _drain(self, dt_s: float, load: float, *, motors: bool) -> None:
+        """Take the current of motors that lift a `load` in weights."""
         p = self.params
-        load = self.collective / p.hover_collective
         self.current_a = p.idle_current_a + (p.hover_current_a * load**1.5 if motors and load > 0 else 0.0)
         used_frac = self.current_a * dt_s / (p.battery_capacity_ah * 3600.0)
         self.battery_frac = max(0.0, self.battery_frac - used_frac)

@@ -85,7 +85,7 @@ class RotorpyAirframe(Airframe):
             self._fly(dt_s, command, thrust_n)
         lift_n = float((self._rotors_radps**2).sum()) * weight_n / (4.0 * self._idle_radps**2)
         self.collective = self.params.hover_collective * lift_n / weight_n
-        self._drain(dt_s, motors=command.motors)
+        self._drain(dt_s, lift_n / weight_n, motors=command.motors)
 
     def _stand(self, dt_s: float, thrust_n: float) -> None:
         """On its skids, level, the motors at what is asked of them."""

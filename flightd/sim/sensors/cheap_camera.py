@@ -58,5 +58,5 @@ class CheapCamera:
             self._bands.lay(picture, stamp_ns, part)
         if automatic is not None:
             automatic.step(metered(picture), (stamp_ns - self._stamp_ns) * 1e-9)
-        self._stamp_ns = stamp_ns
+            self._stamp_ns = stamp_ns
         return picture

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from flightd.app.simulation.prepare import SimOptions, prepare
 from flightd.app.simulation.sensor_summary import sensor_summary
 from flightd.config.paths import shipped
 from flightd.config.schema import load_config
-from flightd.core.errors import RunError
+from flightd.core.errors import FlightdError, RunError
 from flightd.core.snapshot import Snapshot
 from flightd.core.topics import Topic
 from flightd.core.tracks import SensorEstimate
@@ -53,7 +54,7 @@ _DELAY_MS, _ANGLE_DEG = 5.0, 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class PlannedFlight:
     """One flight; `off_ms` None leaves the camera's delay to the world, empty `nodes` are all."""
 
     world: WorldKind
@@ -81,7 +82,7 @@ class Result:
     the sensors' estimates less the truth after 20 s in the air: delay (ms), and the greater one of roll and
     pitch of mount and tilt bias (deg)."""
 
-    asked: Asked
+    planned: PlannedFlight
     completed: bool
     rms_m: float
     hover_p95_m: float
@@ -93,7 +94,7 @@ class Result:
     errors: dict[str, float] = field(default_factory=dict)
 
 
-class _Watch:
+class _SensorProbe:
     """Sees what the flight knows of its sensors so long after its take-off began, or at its end, and what
     attitude it was told in the second before."""
 
@@ -125,38 +126,46 @@ class _Watch:
         return math.degrees(off_roll), math.degrees(off_pitch)
 
 
-def flown_by_pictures(asked: Asked) -> Result:
-    """One flight of the whole pipeline, in lockstep."""
+def flown_by_pictures(planned: PlannedFlight) -> Result:
+    """One flight of the whole pipeline, in lockstep; one that could not be flown is told as aborted."""
+    try:
+        return _flown(planned)
+    except FlightdError as err:
+        nothing = (math.nan,) * 3
+        return Result(planned, False, *nothing, miscounted=0, faults="", unsafe=False, reason=str(err))
+
+
+def _flown(planned: PlannedFlight) -> Result:
     settings, scenario = [], Scenario()
-    if asked.nodes:
-        settings.append(f"mission.nodes={','.join(asked.visits())}")
-    if asked.off_ms is not None:
-        drawn_s = unknowns_of(asked.world, asked.seed).camera_delay_s
+    if planned.nodes:
+        settings.append(f"mission.nodes={','.join(planned.visits())}")
+    if planned.off_ms is not None:
+        drawn_s = unknowns_of(planned.world, planned.seed).camera_delay_s
         camera = {"capture_delay_s": _TRUE_DELAY_S - drawn_s}
         scenario = Scenario.model_validate({"camera": camera})
-        settings.append(f"camera.latency_s={_TRUE_DELAY_S + asked.off_ms / 1e3:.3f}")
+        settings.append(f"camera.latency_s={_TRUE_DELAY_S + planned.off_ms / 1e3:.3f}")
     options = SimOptions(
-        seed=asked.seed,
-        world=asked.world,
-        warehouse=asked.warehouse,
-        plant=asked.plant,
+        seed=planned.seed,
+        world=planned.world,
+        warehouse=planned.warehouse,
+        plant=planned.plant,
         settings=settings,
     )
-    watch, ended = _Watch(), ""
+    probe, ended = _SensorProbe(), ""
     with tempfile.TemporaryDirectory() as folder:
-        simulation = replace(prepare(options, scenario, Path(folder), lambda _: None), observer=watch)
+        simulation = replace(prepare(options, scenario, Path(folder), lambda _: None), observer=probe)
         try:
             fly(simulation)
         except RunError as err:
             ended = str(err)
         judgement = judge_flight(simulation)
         errors = {}
-        if watch.seen is not None:
-            tilt_deg = watch.tilt_error_deg(simulation.truth_log)
-            errors = _errors(sensor_summary(simulation, watch.seen), tilt_deg)
+        if probe.seen is not None:
+            tilt_deg = probe.tilt_error_deg(simulation.truth_log)
+            errors = _errors(sensor_summary(simulation, probe.seen), tilt_deg)
     score = judgement.score
     return Result(
-        asked=asked,
+        planned=planned,
         completed=score.mission == "completed",
         rms_m=_number(score.cross_track_rms_m),
         hover_p95_m=_number(score.hover_error_p95_m),
@@ -186,19 +195,19 @@ def _number(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def flown_ideally(asked: Asked) -> Result:
+def flown_ideally(planned: PlannedFlight) -> Result:
     """One flight by computed sight, with that world's sensors and link."""
-    config, site = load_config(shipped("sim.toml")), asked.site()
-    unknowns = unknowns_of(asked.world, asked.seed)
-    wind, painted = unknowns.wind(WindParams(), told=False), unknowns.floor(site, asked.seed)
+    config, site = load_config(shipped("sim.toml")), planned.site()
+    unknowns = unknowns_of(planned.world, planned.seed)
+    wind, painted = unknowns.wind(WindParams(), told=False), unknowns.floor(site, planned.seed)
     flight = IdealFlight(
-        site, config, visits=asked.visits(), seed=asked.seed, wind=wind, unknowns=unknowns, world=painted
+        site, config, visits=planned.visits(), seed=planned.seed, wind=wind, unknowns=unknowns, world=painted
     )
     flown = flight.fly(_LONGEST_S)
     end, pad = flown.truth[-1][1], site.nodes[site.home.node]
     completed = flown.phase is Phase.DONE
     return Result(
-        asked=asked,
+        planned=planned,
         completed=completed,
         rms_m=rms_off_line(flown, painted),
         hover_p95_m=hover_p95_m(flown, painted),
@@ -247,14 +256,21 @@ def _known_line(results: Sequence[Result]) -> str:
 
 
 def _line(result: Result) -> str:
-    asked, e = result.asked, result.errors
+    planned, e = result.planned, result.errors
     outcome = f"{'completed' if result.completed else 'ABORTED'}: {result.reason} {result.faults}"
-    off = "" if asked.off_ms is None else f"{asked.off_ms:+d}"
+    off = "" if planned.off_ms is None else f"{planned.off_ms:+d}"
     known = f"{e['delay_ms']:+6.1f} {e['mount_deg']:5.2f} {e['tilt_deg']:5.2f}" if e else " " * 18
     return (
-        f"{asked.seed:>6} {off:>4} {result.rms_m:6.3f} {result.hover_p95_m:6.3f} {result.landed_m:6.3f}"
+        f"{planned.seed:>6} {off:>4} {result.rms_m:6.3f} {result.hover_p95_m:6.3f} {result.landed_m:6.3f}"
         f" {known}  {outcome}"
     )
+
+
+def _document(result: Result) -> dict[str, Any]:
+    found = asdict(result)
+    return {
+        key: None if isinstance(value, float) and math.isnan(value) else value for key, value in found.items()
+    }
 
 
 def main() -> int:
@@ -271,10 +287,12 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1, help="so many flights at once")
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
+    if given.ideal and (given.off_ms or given.plant is not PlantKind.OWN):
+        parser.error("--ideal flies our own airframe, its delay as the world draws it")
     first, _, last = given.seeds.partition("-")
     offs = [int(off) for off in given.off_ms.split(",")] if given.off_ms else [None]
     each = [
-        Asked(
+        PlannedFlight(
             given.world,
             seed,
             given.nodes,
@@ -293,7 +311,7 @@ def main() -> int:
             print(_line(result), flush=True)
     print(summary_line(results))
     if given.json is not None:
-        given.json.write_text(json.dumps([asdict(result) for result in results], indent=1))
+        given.json.write_text(json.dumps([_document(result) for result in results], indent=1))
     return 0 if all(result.completed and not result.unsafe for result in results) else 1
 
 

@@ -101,7 +101,7 @@ def test_some_readings_come_back_by_a_longer_way() -> None:
     assert {exact.range_m(airframe) for _ in range(200)} == {1.6}
 
 
-def test_what_the_plant_of_a_world_draws_leaves_all_else_as_it_was() -> None:
+def test_the_plant_that_is_drawn_is_within_its_world() -> None:
     site = load_site(shipped("site-demo.toml"))
     usual, rough = unknowns_of(WorldKind.USUAL, 5), unknowns_of(WorldKind.ROUGH, 5)
     assert usual.wash(site, 5) is None

@@ -145,6 +145,17 @@ def test_false_widths_contradict_nothing_however_many_frames_there_are(fps: floa
         assert heights.share == 1.0
 
 
+def test_a_height_that_was_contradicted_is_put_right_down_to_the_floor() -> None:
+    heights = Frames()
+    for n in range(120):
+        heights.sees([1.6], 1.6 if n < 30 else 3.2)
+    for n in range(132):
+        sunk_m = 1.6 - 0.011 * n
+        believed_m = heights.sees([sunk_m], 2.0 * sunk_m)
+    assert believed_m == pytest.approx(sunk_m, rel=0.1)
+    assert sunk_m < 0.175
+
+
 def test_a_range_finder_that_reads_its_least_above_a_drone_that_stands_is_right() -> None:
     """Doubted, it ended the take-off of every eighth flight whose camera saw lines from the floor."""
     heights = Frames()
