@@ -82,10 +82,8 @@ class Unknowns:
     drag_share: float = 1.0
     capacity_share: float = 1.0
     """Of the battery."""
-    sags: bool = False
-    """The battery's voltage takes thrust."""
     thrust_to_weight: float | None = None
-    """The most that the motors lift; None: all that is asked for."""
+    """The most that the motors lift, less as the battery's voltage sags; None: all that is asked for."""
     wash_mps: float = 0.0
     """Rms of the air that comes back right beside floor and racks."""
     range_lag_s: float = 0.0
@@ -183,7 +181,7 @@ class Unknowns:
             hover_collective=configured.hover_collective * self.hover_share,
             drag_per_s=configured.drag_per_s * self.drag_share,
             battery_capacity_ah=configured.battery_capacity_ah * self.capacity_share,
-            sags=self.sags,
+            sags=self.thrust_to_weight is not None,
             thrust_to_weight=self.thrust_to_weight,
         )
 
@@ -332,13 +330,12 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     if kind is WorldKind.IDEAL:
         return NOTHING
     most, rng = SPREADS[kind], random.Random(f"unknowns {kind} {seed}")
-    body = random.Random(f"body {kind} {seed}")
+    body, light = random.Random(f"body {kind} {seed}"), random.Random(f"exposure {kind} {seed}")
 
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
 
     uneven_s = within(most.uneven_s)
-    light = random.Random(f"exposure {kind} {seed}")
     return Unknowns(
         kind=kind,
         camera_delay_s=within(most.delay_s),
@@ -368,7 +365,6 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         face_light=(most.darkest_face, most.lightest_face),
         drag_share=1.0 + body.uniform(-most.body_share, most.body_share),
         capacity_share=1.0 + body.uniform(-most.body_share, most.body_share),
-        sags=most.thrust_to_weight is not None,
         thrust_to_weight=most.thrust_to_weight,
         wash_mps=most.wash_mps,
         range_lag_s=most.range_lag_s,

@@ -448,10 +448,7 @@ class FloorFilter:
             mine = [-float(error) for error, of in zip(told, axes, strict=True) if of == axis]
             if mine:
                 self._innovations.take(axis, sum(mine) / len(mine))
-        weighed = by_tilt.T @ np.linalg.solve(spread, np.column_stack((errors, by_tilt)))
-        expected = float(np.trace(weighed[:, 1:]))
-        if expected > 0.0:
-            self._innovations.shaken(float(weighed[:, 0] @ weighed[:, 0]) / expected)
+        self._innovations.shaken(errors, spread, by_tilt)
 
     def _add(self, sight: LineSight, rates: Rates, stamp_ns: int, before: Matrix) -> None:
         """A line where it was seen, as wrong as everything by which it was placed; moved by what the frame

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from flightd.core.geometry import Matrix
+
 _BIAS_GAIN, _BIASED = 0.25, 0.6
 """Innovations whose running mean is beyond this, in sigmas, all err to one side: the wind has changed."""
 _SHAKE_GAIN = 0.03
@@ -13,12 +17,8 @@ _MOST_RATIO = 9.0
 
 
 class Innovations:
-    """Give `take` each frame's mean innovation along an axis, in units of its standard deviation.
-
-    Give `shaken` the square of that part of a frame's innovations e, of covariance S, which a shaken picture
-    makes of all its lines alike, |B' S^-1 e|^2 with B their derivative by roll and pitch, in units of what is
-    expected of it, trace(B' S^-1 B).  It is 1 in the mean where the likelihood has its greatest value; the
-    mean square of all innovations is not, where the noise of single lines is assumed too large."""
+    """Give `take` each frame's mean innovation along an axis, in units of its standard deviation, and
+    `shaken` all of them."""
 
     def __init__(self, shake_rad: float, bounds_rad: tuple[float, float]) -> None:
         self._bounds_rad = bounds_rad
@@ -44,7 +44,19 @@ class Innovations:
         self.rough = min(max(self.rough * (1.0 + _ROUGH_GAIN * agree), _LEAST_ROUGH), _MOST_ROUGH)
         self._last[axis] = mean
 
-    def shaken(self, ratio: float) -> None:
+    def shaken(self, errors: Matrix, spread: Matrix, by_tilt: Matrix) -> None:
+        """Follow the innovations e (m,), expected to have the covariance S (m, m); B (m, 2) is their
+        derivative by roll and pitch.
+
+        Judged is the square of that part of them which a shaken picture makes of all lines alike,
+        |B' S^-1 e|^2, in units of what is expected of it, trace(B' S^-1 B).  It is 1 in the mean where the
+        likelihood has its greatest value; the mean square of all innovations is not, where the noise of
+        single lines is assumed too large."""
+        weighed = by_tilt.T @ np.linalg.solve(spread, np.column_stack((errors, by_tilt)))
+        expected = float(np.trace(weighed[:, 1:]))
+        if not expected > 0.0:
+            return
+        ratio = float(weighed[:, 0] @ weighed[:, 0]) / expected
         low, high = self._bounds_rad
         shake_rad = self.shake_rad * (1.0 + _SHAKE_GAIN * (min(ratio, _MOST_RATIO) - 1.0))
         self.shake_rad = min(max(shake_rad, low), high)

@@ -19,6 +19,19 @@ class _Reading(NamedTuple):
     distance_m: float
     stamp_ns: int
 
+    def repeats(self, other: _Reading) -> bool:
+        return self.distance_m == other.distance_m and self.stamp_ns - other.stamp_ns < _REPEATED_NS
+
+    def agrees_with(self, other: _Reading) -> bool:
+        same_m = max(_SAME_M, _SAME_SHARE * max(self.height_m, other.height_m))
+        return abs(self.height_m - other.height_m) <= same_m
+
+    def follows(self, last: _Reading) -> bool:
+        """Whether it is no leap from the last one, or that is forgotten."""
+        since_ns = self.stamp_ns - last.stamp_ns
+        bound_m = _LEAP_M + _LEAP_MPS * max(since_ns, 0) * 1e-9
+        return since_ns > _FORGOTTEN_NS or abs(self.height_m - last.height_m) <= bound_m
+
 
 class HeightLeapGate:
     """Call `accepts` with each height that a range finder tells.
@@ -33,20 +46,12 @@ class HeightLeapGate:
 
     def accepts(self, height_m: float, distance_m: float, stamp_ns: int) -> bool:
         """Take the height that was measured then as that distance along the body; whether it is believed."""
-        new, last, leapt = _Reading(height_m, distance_m, stamp_ns), self._accepted, self._leapt
-        since_ns = stamp_ns - last.stamp_ns if last is not None else _FORGOTTEN_NS + 1
-        if last is None or since_ns > _FORGOTTEN_NS:
-            accepted = True
-        else:
-            accepted = abs(height_m - last.height_m) <= _LEAP_M + _LEAP_MPS * max(since_ns, 0) * 1e-9
-        if not accepted and leapt is not None:
-            repeated = distance_m == leapt.distance_m and stamp_ns - leapt.stamp_ns < _REPEATED_NS
-            if repeated:
+        new, leapt = _Reading(height_m, distance_m, stamp_ns), self._leapt
+        if self._accepted is not None and not new.follows(self._accepted):
+            if leapt is not None and new.repeats(leapt):
                 return False
-            same_m = max(_SAME_M, _SAME_SHARE * max(height_m, leapt.height_m))
-            accepted = abs(height_m - leapt.height_m) <= same_m
-        if accepted:
-            self._accepted, self._leapt = new, None
-        else:
-            self._leapt = new
-        return accepted
+            if leapt is None or not new.agrees_with(leapt):
+                self._leapt = new
+                return False
+        self._accepted, self._leapt = new, None
+        return True

@@ -94,6 +94,7 @@ class Airframe:
         self.collective = 0.0
         self.battery_frac = battery_frac
         self.current_a = 0.0
+        self._full_v = self._open_v(1.0) - self.params.battery_resistance_ohm * self.params.hover_current_a
         self.on_floor = True
         self.touchdown_mps = 0.0
         """Sink rate at the last contact with the floor."""
@@ -124,11 +125,7 @@ class Airframe:
 
     def _battery_share(self) -> float:
         """Of a collective's thrust on a full battery."""
-        p = self.params
-        if not p.sags:
-            return 1.0
-        full_v = self._open_v(1.0) - p.battery_resistance_ohm * p.hover_current_a
-        return (self.battery_v / full_v) ** 2
+        return (self.battery_v / self._full_v) ** 2 if self.params.sags else 1.0
 
     @property
     def tilt_cos(self) -> float:

@@ -106,7 +106,7 @@ def test_the_plant_that_is_drawn_is_within_its_world() -> None:
     usual, rough = unknowns_of(WorldKind.USUAL, 5), unknowns_of(WorldKind.ROUGH, 5)
     assert usual.wash(site, 5) is None
     assert rough.wash(site, 5) is not None
-    assert (usual.sags, usual.thrust_to_weight) == (False, None)
+    assert (usual.airframe(AirframeParams()).sags, usual.thrust_to_weight) == (False, None)
     shares = [unknowns_of(WorldKind.ROUGH, seed).drag_share for seed in range(100)]
     assert 0.75 <= min(shares) < 0.8
     assert 1.2 < max(shares) <= 1.25
