@@ -98,9 +98,9 @@ class ControlExpert(Section):
         0.1, ge=0, le=100, description="most that the height loop's integral asks for"
     )
     height_output_limit_mps: float = Field(0.8, gt=0, le=100, description="most the height loop asks for")
-    max_tilt_rate_degps: float = Field(60.0, gt=0, le=360, description="fastest change of a tilt setpoint")
+    max_tilt_rate_degps: float = Field(150.0, gt=0, le=360, description="fastest change of a tilt setpoint")
     max_jerk_mps3: float = Field(
-        12.0, gt=0.5, le=100, description="fastest change of the horizontal acceleration, g tan(tilt)"
+        30.0, gt=0.5, le=100, description="fastest change of the horizontal acceleration, g tan(tilt)"
     )
     max_yaw_accel_degps2: float = Field(
         180.0, gt=5, le=2000, description="fastest change of the yaw rate setpoint"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-_LEAST_MPS = 0.3
+_LEAST_MPS = 0.4
 """Half swings that stay slower are none: gusts make as much."""
 _SHORTEST_S, _LONGEST_S = 0.15, 2.5
 """Of a half swing: shorter is noise, slower is guidance."""

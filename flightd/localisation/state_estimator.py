@@ -28,7 +28,7 @@ from flightd.tracking.stuck_height import StuckHeight
 
 _LATE_GAIN, _MOST_LATE_S = 0.02, 0.15
 """How soon the usual delay of attitudes is believed, and the most of it."""
-_FREE_S, _LEAST_EASE = 0.15, 0.35
+_FREE_S, _LEAST_EASE = 0.2, 0.35
 """The configured gains are for a loop that is no later than this, beside the attitude's own; a later one
 answers more slowly in proportion, down to this share."""
 _JITTERS, _MOST_JITTER_S = 2.0, 0.5

@@ -20,6 +20,11 @@ _STEADY_S, _STEADY_SHARE = 0.95, 0.08
 of it, within so much on average: a range finder that reads too little from the floor on."""
 _UNMEASURED_M = 0.35
 """Range finders need not measure less: one that reads its least above a drone that stands is right."""
+_LOW_M, _NOT_LOW_M = 0.5, 0.9
+"""Up to here lines are so wide in the picture that they tell its height better than a range finder, which
+lags behind a take-off or measures nothing yet; from there up to there both tell it."""
+_LOW_SHARE = 0.5
+"""A line that tells a height further off than by this share of it (its logarithm) may be none of the map."""
 _OTHER_S = 2.95
 """The same for a line of another width than those before it, of which no range finder can be the cause."""
 
@@ -58,7 +63,11 @@ class WidthHeights:
     def believed_m(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int) -> float:
         """The height `told_m` of a frame exposed at `stamp_ns`, unless there is none or the heights of its
         lines by their widths contradict it for long: then theirs.  Theirs at once where they go on as before
-        and what is told leaps away from them."""
+        and what is told leaps away from them, and near the floor."""
+        believed_m = self._judged_m(by_width_m, told_m, stamp_ns)
+        return _near_floor_m(by_width_m, told_m) if believed_m == told_m else believed_m
+
+    def _judged_m(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int) -> float:
         self.by_width_m = None
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
@@ -105,6 +114,15 @@ class WidthHeights:
     @property
     def _believed_share(self) -> float:
         return self.share if abs(self.share - 1.0) > _DOUBTED else 1.0
+
+
+def _near_floor_m(by_width_m: Sequence[float], told_m: float) -> float:
+    """The height told; where it is a low one, that of the line whose width agrees best with it."""
+    if not by_width_m or told_m >= _NOT_LOW_M:
+        return told_m
+    off = min((math.log(one_m / told_m) for one_m in by_width_m), key=abs)
+    low = min((_NOT_LOW_M - told_m) / (_NOT_LOW_M - _LOW_M), 1.0)
+    return told_m * math.exp(low * off) if abs(off) < _LOW_SHARE else told_m
 
 
 def _gain(dt_s: float) -> float:

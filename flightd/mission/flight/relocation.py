@@ -1,4 +1,5 @@
-"""Doubt about the position, and what to do about it: stop, look, climb a little, move on if that is safe.
+"""Doubt about the position, and what to do about it: stop, look, climb a little, move on if that is safe, or
+else back the way it came.
 
 The localiser says how sure it is of the node (`GridPose.integrity`) and, now and then, that the drone
 was somewhere else all along: then its position jumps.  Either stops the flight where it is.
@@ -12,12 +13,15 @@ from collections.abc import Sequence
 from flightd.config.mission import MissionConfig
 from flightd.core.types import Phase
 from flightd.mission.debounce_timer import DebounceTimer
+from flightd.mission.flight.flown_trail import FlownTrail
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.triggers import Trigger
 
 _JUMP_M = 0.3
 _SPEED_SHARE = 3.0
 """A position that changes faster than this many times the flying speed has jumped."""
+_BACK_M = 0.5
+"""So far back it looks again: what made it doubt is judged anew once it was out of view."""
 
 
 class Relocator:
@@ -34,6 +38,7 @@ class Relocator:
         self._sure = DebounceTimer()
         self._look = DebounceTimer()
         self._last: tuple[float, float] | None = None
+        self._trail = FlownTrail()
         self._moved = False
         self._doubted_ns: int | None = None
         self.jump_m = (0.0, 0.0)
@@ -53,6 +58,8 @@ class Relocator:
         """The triggers of a position doubted, sure again, or not found in time."""
         p = self._params
         self._watch_jumps(s)
+        if s.pose is not None and phase is not Phase.RELOCATE:
+            self._trail.step(s.pose.x_m, s.pose.y_m)
         sure = s.pose is not None and s.pose.integrity >= p.integrity_min
         doubt_s = self._doubt.step(s.pose is not None and not sure, s.now_ns)
         sure_s = self._sure.step(sure, s.now_ns)
@@ -73,11 +80,19 @@ class Relocator:
         return {Trigger.POSITION_UNKNOWN} if lost else set()
 
     def next_look(self, s: MissionInputs, anchor: tuple[float, float]) -> tuple[float, float]:
-        """Where to look from: the same place for a while, then along a way that is safe."""
-        if self._look.step(True, s.now_ns) > self._params.expert.relocate_look_s and s.way_out is not None:
-            self._look = DebounceTimer()
-            return anchor[0] + s.way_out[0], anchor[1] + s.way_out[1]
-        return anchor
+        """Where to look from: the same place for a while, then along a way that is safe.  Where the map knows
+        none, for the drone may be anywhere, back the way it came: there the floor was known, and what was
+        flown through is free."""
+        if self._look.step(True, s.now_ns) <= self._params.expert.relocate_look_s:
+            return anchor
+        if s.way_out is not None:
+            on = anchor[0] + s.way_out[0], anchor[1] + s.way_out[1]
+        elif (back := self._trail.back(anchor, _BACK_M)) is not None:
+            on = back
+        else:
+            return anchor
+        self._look = DebounceTimer()
+        return on
 
     def begin(self) -> None:
         """A new look begins."""
@@ -97,12 +112,14 @@ class Relocator:
         self.jump_m = (0.0, 0.0)
         if s.pose is None:  # a new flight begins on its pad, wherever the last one was believed to end
             self._last = None
+            self._trail.clear()
             return
         at = s.pose.x_m, s.pose.y_m
         if self._last is not None:
             dx, dy = at[0] - self._last[0], at[1] - self._last[1]
             if max(abs(dx), abs(dy)) > _JUMP_M + _SPEED_SHARE * self._params.speed_mps * s.dt_s:
                 self.jump_m = (dx, dy)
+                self._trail.shift(dx, dy)
                 self._shift = (self._shift[0] + dx, self._shift[1] + dy)
                 self._moved = s.height_m > self._params.expert.steer_above_m
         self._last = at

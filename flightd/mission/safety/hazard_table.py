@@ -350,7 +350,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "swings",
         Trigger.SWINGS,
-        "half swings of the velocity about the reference's above 0.3 m/s: three, none smaller than four"
+        "half swings of the velocity about the reference's above 0.4 m/s: three, none smaller than four"
         " fifths of the one before, or two that grow: the position loop is too fast for what is late in it",
         Action.HOLD,
         "slowed down to 60 %, then to 35 %, at once where it swings faster than 0.8 m/s, and hardly more than"
@@ -390,9 +390,10 @@ HAZARDS: tuple[Hazard, ...] = (
         "probability of the node below `mission.integrity_min` for 0.3 s (3 s after take-off), or the"
         " position turned out to be another",
         Action.RELOCATE,
-        "stop, climb up to 1 m to see more, move along the line to where the possible places differ; on from"
-        " the right node when sure; land after `mission.relocate_s`, or where no open line leads on from that"
-        " node; no node counts as visited meanwhile",
+        "stop, climb up to 1 m to see more, move along the line to where the possible places differ, or back"
+        " the way it came where that may be anywhere; on from the right node when sure; land after"
+        " `mission.relocate_s`, or where no open line leads on from that node; no node counts as visited"
+        " meanwhile",
         "tests/sim/ideal/test_carried.py",
     ),
     Hazard(

@@ -1,13 +1,17 @@
-"""How high the drone rises to see more of the floor, not knowing where it is."""
+"""How high the drone rises to see more of the floor, not knowing where it is, and where it looks then."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from flightd.core.types import Phase
 from flightd.mission.flight.relocation import Relocator
 from flightd.mission.guidance import CEILING_MARGIN_M
 from flightd.site.site_file import parse_site
 from tests.unit.mission.configured import configured
+from tests.unit.mission.driven import TICK_NS, Flight
 
 SITE = """
 [site]
@@ -43,3 +47,31 @@ def test_the_climb_ends_below_the_ceiling_and_below_every_keep_out_above(
     relocator = Relocator(configured().mission, site.ceiling_m - CEILING_MARGIN_M, site.overhead_m)
     assert relocator.height_m(flown_m) == pytest.approx(wanted_m)
     assert relocator.raised_m(flown_m, 0.1) == pytest.approx(min(flown_m + 0.1, wanted_m))
+
+
+@pytest.mark.parametrize("knows", [False, True], ids=["it may be anywhere", "the map knows a way"])
+def test_it_moves_on_where_the_map_knows_a_way_and_else_back_the_way_it_came(*, knows: bool) -> None:
+    config = configured().mission
+    relocator, flight = Relocator(config, 5.5, ()), Flight()
+    flight.to(Phase.FOLLOW)
+    inputs = flight.inputs
+    assert inputs.pose is not None
+    x_m, y_m = inputs.pose.x_m, inputs.pose.y_m
+    for tick in range(100):
+        pose = replace(inputs.pose, x_m=x_m + 0.01 * tick)
+        inputs = replace(inputs, now_ns=inputs.now_ns + TICK_NS, pose=pose)
+        relocator.step(inputs, Phase.FOLLOW, 1.0)
+    relocator.begin()
+    anchor, looks = (pose.x_m, y_m), []
+    inputs = replace(inputs, way_out=(0.0, 0.25) if knows else None)
+    for _ in range(round(2.5 * config.expert.relocate_look_s * 1e9 / TICK_NS)):
+        inputs = replace(inputs, now_ns=inputs.now_ns + TICK_NS)
+        relocator.step(inputs, Phase.RELOCATE, 1.0)
+        then, anchor = anchor, relocator.next_look(inputs, anchor)
+        if anchor != then:
+            looks.append(anchor)
+    if knows:
+        assert looks == [(pose.x_m, y_m + 0.25), (pose.x_m, y_m + 0.5)]
+    else:
+        assert len(looks) == 1, "it came only one metre"
+        assert looks[0] == pytest.approx((pose.x_m - 0.6, y_m), abs=0.11)
