@@ -37,8 +37,10 @@ _OWN_LANDING_S, _DISARM_S = 2.5, 5.5
 """Down and still for so long: have the autopilot land by itself, ask it to disarm."""
 _STILL_STEERS = 0.75
 """A take-off that steers already does so down to this share of the height: range finders are noisy."""
-_HURRY = 4.0 / 3.0
-"""How much faster than usual a take-off out of sight climbs, within the limits."""
+_HURRY, _HURRY_ACCEL = 4.0 / 3.0, 2.0
+"""How much faster than usual a take-off out of sight climbs, within the limits, and how much harder."""
+_BEYOND_M = 0.05
+"""A climb that would end so far above its goal, which has come down meanwhile, is stopped as hard."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +96,7 @@ class ReferenceGenerator:
         self._y = Profile(start[1], p.speed_mps, p.accel_mps2)
         self._yaw = Profile(start[2], p.turn_rate_radps, p.expert.turn_accel_radps2)
         self._height = Profile(0.0, p.climb_mps, p.expert.climb_accel_mps2)
-        self._rise = Profile(0.0, _HURRY * p.climb_mps, 2.0 * p.expert.climb_accel_mps2)
+        self._hurried = Profile(0.0, _HURRY * p.climb_mps, _HURRY_ACCEL * p.expert.climb_accel_mps2)
 
     def take_off(self, height_m: float) -> None:
         """A climb begins from here."""
@@ -154,16 +156,20 @@ class ReferenceGenerator:
 
     def _climb_mps(self, s: MissionInputs, task: ReferenceTask) -> float:
         """Climb rate towards the wanted height.  A take-off that drifts where no line tells how hurries: the
-        picture has to widen faster than it leaves the lines behind."""
+        picture has to widen faster than it leaves the lines behind; so does the end of a climb to a height
+        that is no longer wanted."""
+        expert, height, hurried = self._params.expert, self._height, self._hurried
         self.height_goal_m = self._wanted_height_m(task)
-        rises = task.phase is Phase.TAKE_OFF and s.height_m >= self._params.expert.steer_above_m
-        if rises and not self._steers:
-            self._rise.reset(self._height.position, self._height.velocity)
-            self._rise.step(self.height_goal_m, s.dt_s)
-            self._height.reset(self._rise.position, self._rise.velocity)
+        rises = task.phase is Phase.TAKE_OFF and s.height_m >= expert.steer_above_m
+        climb_mps = max(height.velocity, 0.0)
+        ends_m = height.position + climb_mps**2 / (2.0 * expert.climb_accel_mps2)
+        if (rises and not self._steers) or (climb_mps > 0.0 and ends_m > self.height_goal_m + _BEYOND_M):
+            hurried.reset(height.position, height.velocity)
+            hurried.step(self.height_goal_m, s.dt_s)
+            height.reset(hurried.position, hurried.velocity)
         else:
-            self._height.step(self.height_goal_m, s.dt_s)
-        return self._height.velocity
+            height.step(self.height_goal_m, s.dt_s)
+        return height.velocity
 
     def _may_brake(self, s: MissionInputs, task: ReferenceTask) -> bool:
         """Without a view of the floor, but with an attitude by which to dead-reckon from the last one; or,

@@ -75,3 +75,20 @@ def test_it_moves_on_where_the_map_knows_a_way_and_else_back_the_way_it_came(*, 
     else:
         assert len(looks) == 1, "it came only one metre"
         assert looks[0] == pytest.approx((pose.x_m - 0.6, y_m), abs=0.11)
+
+
+def test_a_climb_to_look_that_is_no_longer_wanted_ends_soon() -> None:
+    """As usual it would go on for 0.3 m, in rough air for more than is safe above the commanded height."""
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    flight.integrity = 0.5
+    flight.to(Phase.RELOCATE)
+    flown_m = configured().mission.height_m
+    flight.run(10.0, lambda: flight.inputs.height_m > flown_m + 0.25)
+    flight.integrity = 1.0
+    flight.run(10.0, lambda: flight.mission.height_goal_m == flown_m)
+    from_m = highest_m = flight.inputs.height_m
+    for _ in range(100):
+        flight.run(0.02)
+        highest_m = max(highest_m, flight.inputs.height_m)
+    assert 0.05 < highest_m - from_m < 0.22
