@@ -48,7 +48,10 @@ class MissionExpert(Section):
     height_reached_m: float = Field(0.15, gt=0, le=1, description="a take-off ends this near to its height")
     view_height_m: float = Field(0.08, gt=0, le=1, description="a view is reached this near to its height")
     steer_above_m: float = Field(
-        0.45, ge=0, le=5, description="below this height the lines are neither steered by nor judged"
+        0.45,
+        ge=0,
+        le=5,
+        description="from here a take-off steers by the lines; none is judged below",
     )
     touch_below_m: float = Field(0.35, gt=0, le=5, description="the last stretch of a landing begins here")
     touch_mps: float = Field(0.20, gt=0, le=1, description="rate of the last stretch of a landing")

@@ -28,9 +28,10 @@ from flightd.tracking.stuck_height import StuckHeight
 
 _LATE_GAIN, _MOST_LATE_S = 0.02, 0.15
 """How soon the usual delay of attitudes is believed, and the most of it."""
-_FREE_S, _LEAST_EASE = 0.2, 0.35
+_FREE_S, _LEAST_EASE, _UNSURE = 0.2, 0.35, 4.0 / 3.0
 """The configured gains are for a loop that is no later than this, beside the attitude's own; a later one
-answers more slowly in proportion, down to this share."""
+answers more slowly in proportion, down to this share.  A delay that is not known, over which nothing is
+foreseen, weighs so much more: 0.21 s of it would take all the phase margin."""
 _JITTERS, _MOST_JITTER_S = 2.0, 0.5
 """What comes from the vehicle jitters by so much in the mean; what goes there by as much again."""
 _ATTITUDE_LAG_S = 0.2
@@ -264,7 +265,7 @@ class StateEstimator:
         self._frames_s += _LATE_GAIN * (late_s - self._frames_s)
         slower_s = max(2.0 / response.bandwidth_radps - _ATTITUDE_LAG_S, 0.0)
         unsure_s = math.hypot(response.delay_sigma_s, tracker.delay_sigma_s) + _JITTERS * self._jitter_s
-        total_s = self._frames_s + response.delay_s + slower_s + unsure_s
+        total_s = self._frames_s + response.delay_s + _UNSURE * (slower_s + unsure_s)
         part = TICK_S / _UNLEANT_S
         x, y = self._unleant
         now_x, now_y = tracker.unleant(now_ns)

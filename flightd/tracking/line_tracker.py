@@ -59,7 +59,7 @@ from flightd.tracking.tilt_compensation import (
     ground_lines,
     heights_by_width,
 )
-from flightd.tracking.width_heights import WidthHeights
+from flightd.tracking.width_heights import NearFloor, WidthHeights
 
 _STEP_NS = 20_000_000
 _FARTHEST = 3.0
@@ -116,7 +116,7 @@ class LineTracker:
         self._junctions: tuple[FloorJunction, ...] = ()
         self._markers: tuple[MarkerOffset, ...] = ()
         self.rejected = 0
-        self._widths = WidthHeights()
+        self._widths, self._near_floor = WidthHeights(), NearFloor()
         self._dispute = HeadingDispute()
         self._knocked = False
 
@@ -198,9 +198,11 @@ class LineTracker:
             self.rejected += 1
             return False
         view = self._view(attitude, stamp_ns, height_m, self._lens)
-        by_width_m = heights_by_width(lines.lines, view, self._line_width_m)
+        by_width_m = [one for one in heights_by_width(lines.lines, view, self._line_width_m) if one > 0.0]
         off_share = self._filter.mean(HEIGHT) + self._filter.mean(HEIGHT_SCALE)
         height_m = self._widths.believed_m(by_width_m, height_m, stamp_ns) * (1.0 + off_share)
+        by_lens = 1.0 - self._filter.mean(SCALE)
+        height_m = self._near_floor.height_m([by_lens * one for one in by_width_m], height_m, stamp_ns)
         if not height_m > 0:
             self.rejected += 1
             return False

@@ -23,8 +23,11 @@ _UNMEASURED_M = 0.35
 _LOW_M, _NOT_LOW_M = 0.5, 0.9
 """Up to here lines are so wide in the picture that they tell its height better than a range finder, which
 lags behind a take-off or measures nothing yet; from there up to there both tell it."""
-_LOW_SHARE = 0.5
-"""A line that tells a height further off than by this share of it (its logarithm) may be none of the map."""
+_LOW_SHARE = 0.35
+"""A line that tells a height further off than by this share of it (its logarithm) may be none of the map: a
+take-off of 0.9 m/s is told 0.1 m too low by a range finder that lags 0.1 s."""
+_RISES_MPS = 1.5
+"""No take-off climbs faster, so near the floor its heights change by no more."""
 _OTHER_S = 2.95
 """The same for a line of another width than those before it, of which no range finder can be the cause."""
 
@@ -63,11 +66,7 @@ class WidthHeights:
     def believed_m(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int) -> float:
         """The height `told_m` of a frame exposed at `stamp_ns`, unless there is none or the heights of its
         lines by their widths contradict it for long: then theirs.  Theirs at once where they go on as before
-        and what is told leaps away from them, and near the floor."""
-        believed_m = self._judged_m(by_width_m, told_m, stamp_ns)
-        return _near_floor_m(by_width_m, told_m) if believed_m == told_m else believed_m
-
-    def _judged_m(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int) -> float:
+        and what is told leaps away from them."""
         self.by_width_m = None
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
@@ -116,18 +115,30 @@ class WidthHeights:
         return self.share if abs(self.share - 1.0) > _DOUBTED else 1.0
 
 
-def _near_floor_m(by_width_m: Sequence[float], told_m: float) -> float:
-    """The height told; where it is a low one, that of the line whose width agrees best with it."""
-    if not by_width_m or told_m >= _NOT_LOW_M:
-        return told_m
-    off = min((math.log(one_m / told_m) for one_m in by_width_m), key=abs)
-    low = min((_NOT_LOW_M - told_m) / (_NOT_LOW_M - _LOW_M), 1.0)
-    return told_m * math.exp(low * off) if abs(off) < _LOW_SHARE else told_m
-
-
 def _gain(dt_s: float) -> float:
     """Of a frame that much after the last one, in a mean over the memory."""
     return 1.0 - math.exp(-dt_s / _MEMORY_S)
+
+
+class NearFloor:
+    """The height near the floor: that by the width of a line that is followed from frame to frame."""
+
+    def __init__(self) -> None:
+        self._last_m: float | None = None
+        self._stamp_ns = 0
+
+    def height_m(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int) -> float:
+        """The height `told_m` of the frame exposed at `stamp_ns`; a low one as the line has it whose width
+        agrees best with it, if that tells about the same and the line before went on into it."""
+        dt_s, last_m = min((stamp_ns - self._stamp_ns) * 1e-9, _LONGEST_S), self._last_m
+        self._stamp_ns, self._last_m = stamp_ns, None
+        if not by_width_m or not 0.0 < told_m < _NOT_LOW_M:
+            return told_m
+        self._last_m = now_m = min(by_width_m, key=lambda one_m: abs(math.log(one_m / told_m)))
+        off = math.log(now_m / told_m)
+        goes_on = last_m is not None and abs(now_m - last_m) < LEAP * now_m + _RISES_MPS * dt_s
+        low = min((_NOT_LOW_M - told_m) / (_NOT_LOW_M - _LOW_M), 1.0)
+        return told_m * math.exp(low * off) if goes_on and abs(off) < _LOW_SHARE else told_m
 
 
 class _Watched:

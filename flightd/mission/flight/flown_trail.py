@@ -1,5 +1,5 @@
-"""The way that was flown last, and the way back along it.  What was just flown through is free, wherever on
-the map it is.  Pure."""
+"""The way that was flown last, and the way back along it.  What the drone flew through while it saw the floor
+is free, as high as it was then, wherever on the map it is.  Pure."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import math
 
 _STEP_M = 0.2
 """Points are so far apart; who comes as near to one again has flown a loop, which is left out."""
-_KEPT_M = 4.0
+_KEPT_M = 1.6
+"""No further back: others of a fleet may follow by then."""
 
 
 class FlownTrail:
-    """Call `step` with the place over the floor (m, any axes) at each tick, `shift` when those axes move."""
+    """Call `step` with the place over the floor (m, any axes) at each tick."""
 
     def __init__(self) -> None:
         self._points: list[tuple[float, float]] = []
@@ -30,16 +31,16 @@ class FlownTrail:
         self._points.append((x_m, y_m))
         del self._points[: -round(_KEPT_M / _STEP_M)]
 
-    def shift(self, dx_m: float, dy_m: float) -> None:
-        """The place is told otherwise by so much from now on; what was flown is as far away as before."""
-        self._points = [(x + dx_m, y + dy_m) for x, y in self._points]
-
     def back(self, from_m: tuple[float, float], by_m: float) -> tuple[float, float] | None:
-        """The place about `by_m` before this one on the way here, None where none was so far away; what lay
-        after it is forgotten."""
+        """The place about `by_m` before this one on the way here; None where none is known: nobody has flown
+        straight to one much further away.  What lay after it is forgotten."""
         while self._points:
             point = self._points[-1]
-            if math.dist(point, from_m) >= by_m:
+            apart_m = math.dist(point, from_m)
+            if apart_m > by_m + 2.0 * _STEP_M:
+                break
+            if apart_m >= by_m:
                 return point
             self._points.pop()
+        self.clear()
         return None

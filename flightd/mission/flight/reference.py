@@ -100,6 +100,7 @@ class ReferenceGenerator:
 
     def take_off(self, height_m: float) -> None:
         """A climb begins from here."""
+        self._steers = False
         self._height.reset(0.0 if math.isnan(height_m) else height_m)
 
     def land(self, *, by_itself: bool = False) -> None:
@@ -163,9 +164,10 @@ class ReferenceGenerator:
         rises = task.phase is Phase.TAKE_OFF and s.height_m >= expert.steer_above_m
         climb_mps = max(height.velocity, 0.0)
         ends_m = height.position + climb_mps**2 / (2.0 * expert.climb_accel_mps2)
-        if (rises and not self._steers) or (climb_mps > 0.0 and ends_m > self.height_goal_m + _BEYOND_M):
+        ends_beyond = climb_mps > 0.0 and ends_m > self.height_goal_m + _BEYOND_M
+        if ends_beyond or (rises and not self._steers):
             hurried.reset(height.position, height.velocity)
-            hurried.step(self.height_goal_m, s.dt_s)
+            hurried.step(self.height_goal_m, s.dt_s, climb_mps if ends_beyond else math.inf)
             height.reset(hurried.position, hurried.velocity)
         else:
             height.step(self.height_goal_m, s.dt_s)

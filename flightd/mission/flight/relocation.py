@@ -22,6 +22,9 @@ _SPEED_SHARE = 3.0
 """A position that changes faster than this many times the flying speed has jumped."""
 _BACK_M = 0.5
 """So far back it looks again: what made it doubt is judged anew once it was out of view."""
+_PAST_M = 1.0
+"""So far from where a doubt began the next one is another: at what lies there for good it does not doubt for
+ever."""
 
 
 class Relocator:
@@ -40,7 +43,8 @@ class Relocator:
         self._last: tuple[float, float] | None = None
         self._trail = FlownTrail()
         self._moved = False
-        self._doubted_ns: int | None = None
+        self._doubted: tuple[float, float] | None = None
+        self._sought_s = 0.0
         self.jump_m = (0.0, 0.0)
         self._shift = (0.0, 0.0)
 
@@ -58,26 +62,29 @@ class Relocator:
         """The triggers of a position doubted, sure again, or not found in time."""
         p = self._params
         self._watch_jumps(s)
-        if s.pose is not None and phase is not Phase.RELOCATE:
-            self._trail.step(s.pose.x_m, s.pose.y_m)
+        self._watch_way(s, phase)
         sure = s.pose is not None and s.pose.integrity >= p.integrity_min
         doubt_s = self._doubt.step(s.pose is not None and not sure, s.now_ns)
         sure_s = self._sure.step(sure, s.now_ns)
         if phase is not Phase.RELOCATE:
             patience_s = p.expert.first_look_s if phase is Phase.ACQUIRE else p.expert.doubt_s
             if sure_s > p.expert.settled_s and not self._moved:
-                self._doubted_ns = None
                 self._shift = (0.0, 0.0)
+                if self._doubted is not None and s.distance_m(self._doubted) > _PAST_M:
+                    self._doubted, self._sought_s = None, 0.0
+            elif self._doubted is not None and not sure:
+                self._sought_s += s.dt_s
             doubted = (
                 self._moved or min(doubt_s, phase_s if phase is Phase.ACQUIRE else math.inf) > patience_s
             )
             return {Trigger.POSITION_DOUBTED} if doubted else set()
         self._moved = False
-        self._doubted_ns = self._doubted_ns or s.now_ns
+        if self._doubted is None and s.pose is not None:
+            self._doubted = s.pose.x_m, s.pose.y_m
+        self._sought_s += s.dt_s
         if sure_s > p.expert.settled_s and phase_s > p.expert.settled_s:
             return {Trigger.POSITION_SURE}
-        lost = (s.now_ns - self._doubted_ns) * 1e-9 > p.relocate_s
-        return {Trigger.POSITION_UNKNOWN} if lost else set()
+        return {Trigger.POSITION_UNKNOWN} if self._sought_s > p.relocate_s else set()
 
     def next_look(self, s: MissionInputs, anchor: tuple[float, float]) -> tuple[float, float]:
         """Where to look from: the same place for a while, then along a way that is safe.  Where the map knows
@@ -108,18 +115,28 @@ class Relocator:
         above = (height_m for height_m in self._overhead_m if height_m >= flown_m)
         return max(flown_m, min(flown_m + by_m, self._ceiling_m, *above))
 
+    def _watch_way(self, s: MissionInputs, phase: Phase) -> None:
+        """Keep the way that is flown in sight of the floor."""
+        if s.pose is None or s.sight_s > self._params.lines_hold_s:
+            self._trail.clear()
+        elif phase is not Phase.RELOCATE:
+            self._trail.step(s.pose.x_m, s.pose.y_m)
+
     def _watch_jumps(self, s: MissionInputs) -> None:
         self.jump_m = (0.0, 0.0)
         if s.pose is None:  # a new flight begins on its pad, wherever the last one was believed to end
             self._last = None
             self._trail.clear()
+            self._doubted, self._sought_s = None, 0.0
             return
         at = s.pose.x_m, s.pose.y_m
         if self._last is not None:
             dx, dy = at[0] - self._last[0], at[1] - self._last[1]
             if max(abs(dx), abs(dy)) > _JUMP_M + _SPEED_SHARE * self._params.speed_mps * s.dt_s:
                 self.jump_m = (dx, dy)
-                self._trail.shift(dx, dy)
+                self._trail.clear()  # it may have been reckoned wrongly only since it last saw a line
+                if self._doubted is not None:
+                    self._doubted = self._doubted[0] + dx, self._doubted[1] + dy
                 self._shift = (self._shift[0] + dx, self._shift[1] + dy)
                 self._moved = s.height_m > self._params.expert.steer_above_m
         self._last = at

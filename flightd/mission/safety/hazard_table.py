@@ -391,9 +391,9 @@ HAZARDS: tuple[Hazard, ...] = (
         " position turned out to be another",
         Action.RELOCATE,
         "stop, climb up to 1 m to see more, move along the line to where the possible places differ, or back"
-        " the way it came where that may be anywhere; on from the right node when sure; land after"
-        " `mission.relocate_s`, or where no open line leads on from that node; no node counts as visited"
-        " meanwhile",
+        " the way it came where no such way is safe; on from the right node when sure; land after"
+        " `mission.relocate_s` of doubt within a metre, or where no open line leads on from that node; no"
+        " node counts as visited meanwhile",
         "tests/sim/ideal/test_carried.py",
     ),
     Hazard(

@@ -146,7 +146,7 @@ def test_a_small_battery_flies_the_plan_in_sorties_with_its_reserve() -> None:
         DEMO,
         config(battery=SWAPS.with_values(flight_s=60.0), battery_home=0.02, battery_land=0.01),
         visits=ROW,
-        airframe=AirframeParams(battery_capacity_ah=0.2),
+        airframe=AirframeParams(battery_capacity_ah=0.17),
         pads=PadService(swap_s=6.0),
     )
     lowest = [1.0]

@@ -9,6 +9,7 @@ import pytest
 from flightd.core.types import Phase
 from flightd.mission.flight.relocation import Relocator
 from flightd.mission.guidance import CEILING_MARGIN_M
+from flightd.mission.triggers import Trigger
 from flightd.site.site_file import parse_site
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import TICK_NS, Flight
@@ -92,3 +93,51 @@ def test_a_climb_to_look_that_is_no_longer_wanted_ends_soon() -> None:
         flight.run(0.02)
         highest_m = max(highest_m, flight.inputs.height_m)
     assert 0.05 < highest_m - from_m < 0.22
+
+
+@pytest.mark.parametrize("onward_m", [0.0, 1.5])
+def test_at_what_lies_there_for_good_it_does_not_doubt_for_ever(onward_m: float) -> None:
+    """Tape across a leg: in doubt for 5 s, sure for 2 s, in doubt again; beside it one that flies on, and
+    doubts somewhere else."""
+    relocator, flight = Relocator(configured().mission, 5.5, ()), Flight()
+    flight.to(Phase.FOLLOW)
+    told = flight.inputs
+    assert told.pose is not None
+    sought_s, x_m = 0.0, told.pose.x_m
+    for _ in range(12):
+        for phase, integrity, seconds in ((Phase.RELOCATE, 0.9, 5.0), (Phase.FOLLOW, 1.0, 2.0)):
+            for tick in range(round(seconds * 1e9 / TICK_NS)):
+                x_m += onward_m / seconds * 0.02 * (phase is Phase.FOLLOW)
+                pose = replace(told.pose, x_m=x_m, integrity=integrity)
+                told = replace(told, now_ns=told.now_ns + TICK_NS, pose=pose)
+                if Trigger.POSITION_UNKNOWN in relocator.step(told, phase, 0.02 * tick):
+                    assert not onward_m
+                    assert sought_s == pytest.approx(configured().mission.relocate_s, abs=1.0)
+                    return
+                sought_s += 0.02 if phase is Phase.RELOCATE else 0.0
+    assert onward_m
+
+
+def test_a_way_that_was_reckoned_wrongly_or_out_of_sight_is_not_flown_back() -> None:
+    flight = Flight()
+    flight.to(Phase.FOLLOW)
+    for spoilt in ("not", "jump", "blind", "new flight"):
+        relocator, s = Relocator(configured().mission, 5.5, ()), replace(flight.inputs, way_out=None)
+        assert s.pose is not None
+        x_m = s.pose.x_m
+        for tick in range(120):
+            pose = replace(s.pose, x_m=x_m + 0.01 * tick)
+            if tick == 119 and spoilt == "jump":
+                pose = replace(pose, y_m=pose.y_m + 0.8)
+            s = replace(s, now_ns=s.now_ns + TICK_NS, pose=pose)
+            relocator.step(s, Phase.FOLLOW, 1.0)
+        if spoilt == "blind":
+            relocator.step(replace(s, x_age_s=0.5, y_age_s=0.5, features_age_s=0.5), Phase.HOLD, 1.0)
+        if spoilt == "new flight":
+            relocator.step(replace(s, pose=None), Phase.PREFLIGHT, 1.0)
+        relocator.begin()
+        assert s.pose is not None
+        anchor = s.pose.x_m, s.pose.y_m
+        later = replace(s, now_ns=s.now_ns + 5_000_000_000)
+        relocator.next_look(s, anchor)
+        assert (relocator.next_look(later, anchor) != anchor) is (spoilt == "not"), spoilt

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from flightd.tracking.width_heights import WidthHeights
+from flightd.tracking.width_heights import NearFloor, WidthHeights
 
 
 class Frames(WidthHeights):
@@ -169,18 +169,28 @@ def test_a_range_finder_that_reads_its_least_above_a_drone_that_stands_is_right(
 
 def test_near_the_floor_the_widths_tell_the_height_and_higher_up_the_range_finder() -> None:
     """A range finder whose least reading is 0.3 m and that lags 0.1 s, in a take-off of 0.9 m/s."""
-    heights, off = Frames(), []
+    heights, off = NearFloor(), []
     for frame in range(60):
         true_m = 0.2 + 0.9 * frame / 30.0
         told_m = max(true_m - 0.09, 0.3)
-        off.append((true_m, heights.sees([0.97 * true_m], told_m) / true_m))
-    assert all(share == pytest.approx(0.97, abs=0.01) for true_m, share in off if true_m < 0.55)
+        off.append((true_m, heights.height_m([0.97 * true_m], told_m, frame * 33_333_333) / true_m))
+    assert all(share == pytest.approx(0.97, abs=0.01) for true_m, share in off if 0.25 < true_m < 0.55)
     assert all(share > (true_m - 0.09) / true_m for true_m, share in off if 0.4 < true_m < 0.95)
     assert all(share * true_m == pytest.approx(true_m - 0.09) for true_m, share in off if true_m > 1.0)
 
 
-@pytest.mark.parametrize("by_width_m", [0.2, 0.9], ids=["wide", "narrow"])
-def test_near_the_floor_nothing_is_believed_of_a_line_of_another_width(by_width_m: float) -> None:
-    heights = Frames()
-    assert heights.sees([by_width_m], 0.45) == 0.45
-    assert heights.sees([by_width_m, 0.4], 0.45) == pytest.approx(0.4)
+@pytest.mark.parametrize("share", [0.45, 0.69, 1.45, 2.0])
+def test_near_the_floor_nothing_is_believed_of_a_line_of_another_width(share: float) -> None:
+    heights, other_m = NearFloor(), share * 0.45
+    assert [heights.height_m([other_m], 0.45, frame * 33_000_000) for frame in range(20)] == [0.45] * 20
+    beside = [heights.height_m([other_m, 0.41], 0.45, frame * 33_000_000) for frame in range(20, 40)]
+    assert beside[0] == 0.45
+    assert beside[1:] == pytest.approx([0.41] * 19)
+
+
+def test_near_the_floor_a_line_that_comes_and_goes_tells_no_height() -> None:
+    heights = NearFloor()
+    told = [heights.height_m([(0.36, 0.56)[frame % 2]], 0.45, frame * 33_000_000) for frame in range(40)]
+    assert told == [0.45] * 40
+    assert heights.height_m([], 0.45, 40 * 33_000_000) == 0.45
+    assert heights.height_m([0.4], 0.0, 41 * 33_000_000) == 0.0
