@@ -35,8 +35,6 @@ _REST_MPS = 0.15
 # the autopilots themselves say after a second that they stand
 _OWN_LANDING_S, _DISARM_S = 2.5, 5.5
 """Down and still for so long: have the autopilot land by itself, ask it to disarm."""
-_STILL_STEERS = 0.75
-"""A take-off that steers already does so down to this share of the height: range finders are noisy."""
 _HURRY, _HURRY_ACCEL = 4.0 / 3.0, 2.0
 """How much faster than usual a take-off out of sight climbs, within the limits, and how much harder."""
 _BEYOND_M = 0.05
@@ -222,8 +220,7 @@ class ReferenceGenerator:
     def _steer(self, s: MissionInputs, task: ReferenceTask) -> bool:
         """Move the reference towards where the phase wants it; False when the floor cannot be relied on."""
         p, pose, phase = self._params, s.pose, task.phase
-        steers_m = p.expert.steer_above_m * (_STILL_STEERS if self._steers else 1.0)
-        too_low = phase is Phase.TAKE_OFF and s.height_m < steers_m
+        too_low = phase is Phase.TAKE_OFF and s.height_m < p.expert.steer_above_m
         unseen_s = self._touchdown.unseen_s(s, _target(s, task))
         stale = min(s.x_age_s, s.y_age_s) > unseen_s or s.telemetry_age_s > p.telemetry_hold_s
         unknown = not (s.by_pad and phase in _BY_PAD) and (stale or not s.localised)

@@ -16,6 +16,8 @@ from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from flightd.tracking.carried_motion import NO_LEAD, Lead
 
 _TOUCHDOWN_S = 2.0
+_LOW_M, _LOW_TILT_RAD = 0.5, math.radians(5.0)
+"""Below this height a landing leans by no more: it may stand already, which is known a second later."""
 
 
 class Steering:
@@ -27,6 +29,7 @@ class Steering:
         self._plausibility = plausibility
         self._last_yaw: float | None = None
         self._yaw_rate = 0.0
+        self._lands_low = False
 
     def step(
         self,
@@ -62,6 +65,11 @@ class Steering:
             # above the pad the mission steers on without lines: by the mat, or the motion last known
             by_mat = inputs.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)
             age_s = inputs.telemetry_age_s if by_mat else max(sight_s, inputs.telemetry_age_s)
+        # what reads nothing is as low as it was
+        low = height_m < _LOW_M or (self._lands_low and math.isnan(height_m))
+        self._lands_low = low and guidance.phase is Phase.LAND
+        if self._lands_low:
+            wanted = _upright(wanted)
         around = Surroundings(
             headroom_m=inputs.warnings.headroom_m,
             back=self._plausibility.back(pose, inputs.warnings.line_m) if inputs.localised else None,
@@ -89,3 +97,9 @@ class Steering:
             self._yaw_rate,
             height_m,
         )
+
+
+def _upright(wanted: AttitudeSetpoint) -> AttitudeSetpoint:
+    """The same way, leaning by no more than is safe for what stands."""
+    share = _LOW_TILT_RAD / max(math.hypot(wanted.roll_rad, wanted.pitch_rad), _LOW_TILT_RAD)
+    return replace(wanted, roll_rad=share * wanted.roll_rad, pitch_rad=share * wanted.pitch_rad)

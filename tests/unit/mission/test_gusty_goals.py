@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 from flightd.core.types import Phase
-from flightd.mission.guidance import Guide
 from flightd.mission.machine import Intent, State
 from tests.unit.mission.driven import Flight, at_rest
 from tests.unit.mission.states import fresh
@@ -61,15 +60,3 @@ def test_beside_its_goal_it_is_not_there_before_its_time_is_up() -> None:
         flight.to(Phase.HOVER)
         times_ns.append(flight.now_ns)
     assert times_ns[1] - times_ns[0] > 0.3e9 * _SLACK_S
-
-
-def test_a_take_off_by_a_noisy_height_steers_once_and_for_all() -> None:
-    flight, steers = Flight(), list[bool]()
-    flight.off_m = lambda at_s: (0.0, 0.05 * math.sin(50.0 * at_s))
-    flight.to(Phase.TAKE_OFF)
-    while flight.phase is Phase.TAKE_OFF:
-        flight.run(0.02)
-        assert flight.guidance is not None
-        steers.append(flight.guidance.guide is Guide.STEER)
-    assert steers.index(True) > 10, "not from the floor on"
-    assert all(steers[steers.index(True) :])
