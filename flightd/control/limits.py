@@ -21,13 +21,15 @@ class Surroundings:
     above), `back` the unit vector (forward, right) into the corridor that was left, None inside it;
     `data_age_s` the age of the oldest thing that the lean was computed from, for a brake that of the newest:
     pictures or attitude, either tells enough to come to rest by.  `at_once`: an emergency stop is not kept
-    waiting by the rates.  `climb_error_mps`: the vehicle takes its climb for so much more than it is."""
+    waiting by the rates.  `climb_error_mps`: the vehicle takes its climb for so much more than it is.
+    `most_lean_rad`: the lean as a whole is no greater, whatever each axis is allowed."""
 
     headroom_m: float = math.inf
     back: tuple[float, float] | None = None
     data_age_s: float = 0.0
     at_once: bool = False
     climb_error_mps: float = 0.0
+    most_lean_rad: float = math.inf
 
 
 OPEN = Surroundings()
@@ -54,7 +56,8 @@ class Limiter:
         roll, pitch, yaw_rate = wanted.roll_rad, wanted.pitch_rad, wanted.yaw_rate_radps
         if around.at_once or not around.data_age_s <= limits.expert.stale_s:  # NaN is stale, too
             roll = pitch = yaw_rate = 0.0
-        roll, pitch = _clamp(roll, limits.max_tilt_rad), _clamp(pitch, limits.max_tilt_rad)
+        share = min(1.0, around.most_lean_rad / (math.hypot(roll, pitch) or 1.0))
+        roll, pitch = _clamp(share * roll, limits.max_tilt_rad), _clamp(share * pitch, limits.max_tilt_rad)
         if around.back is not None:
             roll, pitch = _inwards(roll, pitch, around.back)
             most = max(abs(roll), abs(pitch), limits.max_tilt_rad) / limits.max_tilt_rad

@@ -18,6 +18,8 @@ LEAP, LEAP_PER_S = 0.04, 1.8
 _STEADY_S, _STEADY_SHARE = 0.95, 0.08
 """Widths that never agreed with the height are held against it, too, once they were so long the same share
 of it, within so much on average: a range finder that reads too little from the floor on."""
+_OTHER_S = 2.95
+"""The same for a line of another width than those before it, of which no range finder can be the cause."""
 _UNMEASURED_M = 0.35
 """Range finders need not measure less: one that reads its least above a drone that stands is right."""
 _LOW_M, _NOT_LOW_M = 0.5, 0.9
@@ -28,8 +30,6 @@ _LOW_SHARE = 0.35
 take-off of 0.9 m/s is told 0.1 m too low by a range finder that lags 0.1 s."""
 _RISES_MPS = 1.5
 """No take-off climbs faster, so near the floor its heights change by no more."""
-_OTHER_S = 2.95
-"""The same for a line of another width than those before it, of which no range finder can be the cause."""
 
 
 class WidthHeights:

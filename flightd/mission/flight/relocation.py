@@ -126,7 +126,6 @@ class Relocator:
         self.jump_m = (0.0, 0.0)
         if s.pose is None:  # a new flight begins on its pad, wherever the last one was believed to end
             self._last = None
-            self._trail.clear()
             self._doubted, self._sought_s = None, 0.0
             return
         at = s.pose.x_m, s.pose.y_m

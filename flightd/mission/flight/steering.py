@@ -16,7 +16,7 @@ from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from flightd.tracking.carried_motion import NO_LEAD, Lead
 
 _TOUCHDOWN_S = 2.0
-_LOW_M, _LOW_TILT_RAD = 0.5, math.radians(5.0)
+_LOW_M, _LOW_LEAN_RAD = 0.5, math.radians(5.0)
 """Below this height a landing leans by no more: it may stand already, which is known a second later."""
 
 
@@ -68,13 +68,12 @@ class Steering:
         # what reads nothing is as low as it was
         low = height_m < _LOW_M or (self._lands_low and math.isnan(height_m))
         self._lands_low = low and guidance.phase is Phase.LAND
-        if self._lands_low:
-            wanted = _upright(wanted)
         around = Surroundings(
             headroom_m=inputs.warnings.headroom_m,
             back=self._plausibility.back(pose, inputs.warnings.line_m) if inputs.localised else None,
             data_age_s=age_s,
             at_once=guidance.at_once,
+            most_lean_rad=_LOW_LEAN_RAD if self._lands_low else math.inf,
             climb_error_mps=inputs.warnings.climb_error_mps,
         )
         return self._limiter.apply(wanted, around)
@@ -97,9 +96,3 @@ class Steering:
             self._yaw_rate,
             height_m,
         )
-
-
-def _upright(wanted: AttitudeSetpoint) -> AttitudeSetpoint:
-    """The same way, leaning by no more than is safe for what stands."""
-    share = _LOW_TILT_RAD / max(math.hypot(wanted.roll_rad, wanted.pitch_rad), _LOW_TILT_RAD)
-    return replace(wanted, roll_rad=share * wanted.roll_rad, pitch_rad=share * wanted.pitch_rad)
