@@ -76,7 +76,9 @@ class OwnDatabase:
 
     def _prepare(self, database: sqlite3.Connection) -> None:
         """Make the tables where the file is new: a power cut, or another process, may come in between."""
-        if self._is_empty(database):
+        with _transaction(database, "DEFERRED"):  # one look: whoever makes them now waits for its end
+            is_new = self._is_empty(database)
+        if is_new:
             with _transaction(database):
                 if self._is_empty(database):
                     for statement in self.schema.split(";\n"):
@@ -101,8 +103,8 @@ def make_private_file(file: Path) -> None:
 
 
 @contextmanager
-def _transaction(database: sqlite3.Connection) -> Iterator[None]:
-    database.execute("BEGIN IMMEDIATE")
+def _transaction(database: sqlite3.Connection, kind: str = "IMMEDIATE") -> Iterator[None]:
+    database.execute(f"BEGIN {kind}")
     try:
         yield
         database.execute("COMMIT")

@@ -183,7 +183,7 @@ async def test_a_run_that_is_due_starts_one_flight_however_the_clock_jumps_and_t
         async with served(
             drone, folder=tmp_path, state=state, viewers=[viewer], clock=clock.station
         ) as station:
-            await ask(station, "PUT", "/schedule-1", **TUESDAYS)
+            assert (await ask(station, "PUT", "/schedule-1", **TUESDAYS))[0] == 200
             await viewer.until(lambda told: "status" in told)
             assert not viewer.told["link"].attends
             clock.set("2026-10-20T20:00")
@@ -218,7 +218,7 @@ async def test_where_the_site_file_does_not_allow_it_nothing_starts_and_it_is_to
         status, command = flight.ports
         drone = ("demo", Address("127.0.0.1", status, command))
         async with served(drone, folder=tmp_path, viewers=[viewer], clock=clock.station) as station:
-            await ask(station, "PUT", "/schedule-1", **TUESDAYS)
+            assert (await ask(station, "PUT", "/schedule-1", **TUESDAYS))[0] == 200
             clock.set("2026-10-20T20:00")
             waits = await run_is(station, "waiting", "rules")
             assert waits["why"] == "the site file of demo does not say unattended_start = true"
