@@ -72,6 +72,7 @@ def _worlds() -> str:
     rows = (
         ("camera: delay off by up to", "delay_s", 1e3, "ms"),
         ("camera: jitter added, up to", "jitter_s", 1e3, "ms"),
+        ("camera: delay that leaps in flight, by", "delay_leap_s", 1e3, "ms"),
         ("camera: roll and pitch of the mount, up to", "mount_deg", 1, "deg"),
         ("camera: yaw of the mount, up to", "mount_yaw_deg", 1, "deg"),
         ("camera: focal length off by up to", "focal_share", 1e2, "%"),
@@ -87,6 +88,7 @@ def _worlds() -> str:
         ("attitude: error that wanders, rms", "tilt_wander_deg", 1, "deg"),
         ("attitude: leaks to level within", "leak_s", 1, "s"),
         ("autopilot's clock fast or slow by up to", "clock_ppm", 1, "ppm"),
+        ("autopilot's clock set in flight, by", "clock_leap_s", 1e3, "ms"),
         ("gyros: yaw rate off for good by up to", "yaw_drift_degps", 1, "deg/s"),
         ("gyros: rates too large or small by up to", "gyro_share", 1e2, "%"),
         ("telemetry: least delay of either way", "path_s", 1e3, "ms"),

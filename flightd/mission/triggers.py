@@ -73,6 +73,7 @@ class Trigger(enum.Enum):
     BATTERY_LOW = "battery low"
     DETECTOR_LOST = "a detector process was replaced"
     RECORDER_DEAD = "the log's writer was started again"
+    DELAY_LEAPT = "the camera's delay is another one"
     PLAN = "a plan ordered"
     START = "start ordered"
     GOTO = "another node ordered"

@@ -39,6 +39,8 @@ class WorldKind(enum.StrEnum):
 
 _SENSORS = SensorParams()
 _GUST_RMS_MPS = WindParams().gust_rms_mps
+_LEAPS_AT_S = 35.0, 60.0
+"""When delays and clocks leap: what the flight knew twenty seconds after its take-off is judged by then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,10 @@ class Unknowns:
     kind: WorldKind = WorldKind.IDEAL
     camera_delay_s: float = 0.0
     camera_jitter_s: float = 0.0
+    camera_leap_s: float = 0.0
+    """By so much pictures come later from `camera_leap_at_s` on: a frame more is queued, or one less."""
+    camera_leap_at_s: float = math.inf
+    """Since the camera took its first one."""
     mount_roll_rad: float = 0.0
     mount_pitch_rad: float = 0.0
     mount_yaw_rad: float = 0.0
@@ -68,6 +74,9 @@ class Unknowns:
     leak_s: float | None = None
     """Time within which the told attitude leaks towards level; None: it does not."""
     clock_ppm: float = 20.0
+    clock_leap_s: float = 0.0
+    """By so much the autopilot's clock is set from `clock_leap_at_s` after its boot on."""
+    clock_leap_at_s: float = math.inf
     path_s: tuple[float, float] = (0.0, 0.0)
     """Least delay of telemetry, and of what is sent to the autopilot."""
     path_jitter_s: float = 0.0
@@ -200,6 +209,7 @@ class Spread:
 
     delay_s: float
     jitter_s: float
+    delay_leap_s: float
     mount_deg: float
     mount_yaw_deg: float
     focal_share: float
@@ -213,6 +223,7 @@ class Spread:
     tilt_wander_deg: float
     leak_s: float
     clock_ppm: float
+    clock_leap_s: float
     path_s: float
     uneven_s: float
     path_jitter_s: float
@@ -243,6 +254,7 @@ SPREADS = {
     WorldKind.USUAL: Spread(
         delay_s=0.025,
         jitter_s=0.005,
+        delay_leap_s=0.0,
         mount_deg=1.0,
         mount_yaw_deg=2.0,
         focal_share=0.01,
@@ -256,6 +268,7 @@ SPREADS = {
         tilt_wander_deg=0.15,
         leak_s=6.0,
         clock_ppm=50.0,
+        clock_leap_s=0.0,
         path_s=0.010,
         uneven_s=0.003,
         path_jitter_s=0.005,
@@ -284,6 +297,7 @@ SPREADS = {
     WorldKind.ROUGH: Spread(
         delay_s=0.050,
         jitter_s=0.020,
+        delay_leap_s=0.033,
         mount_deg=2.5,
         mount_yaw_deg=4.0,
         focal_share=0.04,
@@ -297,7 +311,8 @@ SPREADS = {
         tilt_wander_deg=1.0,
         leak_s=2.0,
         clock_ppm=20_000.0,
-        path_s=0.026,
+        clock_leap_s=0.020,
+        path_s=0.040,
         uneven_s=0.018,
         path_jitter_s=0.020,
         range_noise_m=0.04,
@@ -330,16 +345,19 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     if kind is WorldKind.IDEAL:
         return NOTHING
     most, rng = SPREADS[kind], random.Random(f"unknowns {kind} {seed}")
+    leaps = random.Random(f"leaps {kind} {seed}")
     body, light = random.Random(f"body {kind} {seed}"), random.Random(f"exposure {kind} {seed}")
 
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
 
-    uneven_s = within(most.uneven_s)
+    uneven_s, delay_s = within(most.uneven_s), within(most.delay_s)
     return Unknowns(
         kind=kind,
-        camera_delay_s=within(most.delay_s),
+        camera_delay_s=delay_s,
         camera_jitter_s=most.jitter_s,
+        camera_leap_s=math.copysign(most.delay_leap_s, -delay_s),
+        camera_leap_at_s=leaps.uniform(*_LEAPS_AT_S) if most.delay_leap_s else math.inf,
         mount_roll_rad=math.radians(within(most.mount_deg)),
         mount_pitch_rad=math.radians(within(most.mount_deg)),
         mount_yaw_rad=math.radians(within(most.mount_yaw_deg)),
@@ -350,6 +368,8 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         tilt_wander_rad=math.radians(most.tilt_wander_deg),
         leak_s=most.leak_s,
         clock_ppm=within(most.clock_ppm),
+        clock_leap_s=leaps.choice((-1.0, 1.0)) * most.clock_leap_s,
+        clock_leap_at_s=leaps.uniform(*_LEAPS_AT_S) if most.clock_leap_s else math.inf,
         path_s=(most.path_s + uneven_s, most.path_s - uneven_s),
         path_jitter_s=most.path_jitter_s,
         range_noise_m=most.range_noise_m,

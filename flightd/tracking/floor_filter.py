@@ -27,6 +27,7 @@ from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, p
 from flightd.tracking.held_lines import SURE_HITS, HeldLine, associate, refound
 from flightd.tracking.innovations import Innovations
 from flightd.tracking.kalman import corrected, predicted
+from flightd.tracking.leap_test import LeapTest
 from flightd.tracking.line_sight import FeatureSight, LineSight, Rates
 from flightd.tracking.motion_model import (
     DELAY,
@@ -70,6 +71,7 @@ _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
 _DELAY_UNSEEN_S = 0.002
 """What the shake of frames makes of their delay, and no row tells: usual flights err to one side by it."""
+_DELAY_LEAP_S = 0.02
 _OUTLIER_SIGMAS = 3.0
 """What errs by more is weighed less (Huber)."""
 _FRESH, _TELLING, _FEATURE_SIGMAS = 3, 2, 4.0
@@ -109,6 +111,7 @@ class FloorFilter:
         self._steady, self._unseen_s, self._followed_ns = [0.0, 0.0], [0.0, 0.0], [0, 0]
         self._refused: set[int | None] = set()
         self._innovations = Innovations(priors.shake_rad, priors.shake_bounds_rad)
+        self.delay_leap = LeapTest(_DELAY_LEAP_S)
 
     # What is known
 
@@ -238,6 +241,7 @@ class FloorFilter:
             self._drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
         noise_q[_DIAGONAL] += self._drift**2 * dt_s
         self._p = predicted(self._p, step.jacobian, noise_q)
+        self.delay_leap.moved(self.mean(DELAY), self.sigma(DELAY), dt_s)
         self._fade(dt_s)
 
     def update(
@@ -434,6 +438,8 @@ class FloorFilter:
         self._bound(DELAY, -delay_s, min(delay_s, self._latency_s))  # no frame arrives before it is exposed
         if minded:
             self._mind(errors, spread, by_tilt, measured.axes)
+            if self.delay_leap.contradicted(rows[:, DELAY], errors, spread):
+                self._p[DELAY, DELAY] += self._priors.delay_s**2
 
     def _bound_push(self) -> None:
         for push in PUSH:

@@ -141,6 +141,11 @@ class LineTracker:
         return self._filter.mean(SCALE) + self._filter.mean(HEIGHT_SCALE)
 
     @property
+    def delay_leaps(self) -> int:
+        """How often the camera's delay became another one."""
+        return self._filter.delay_leap.leaps
+
+    @property
     def by_width_m(self) -> float | None:
         """The height by the lines' width in the newest frame; None where they tell none."""
         return self._widths.by_width_m

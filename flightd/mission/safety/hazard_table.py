@@ -323,6 +323,16 @@ HAZARDS: tuple[Hazard, ...] = (
         "tests/sim/hazards/test_camera_times.py",
     ),
     Hazard(
+        "delay_leapt",
+        Trigger.DELAY_LEAPT,
+        "what lines err by while the drone leans, all of them together: Page's test for a delay of the camera"
+        " that is another one by 20 ms",
+        Action.REPORT,
+        "it is learnt anew, as quickly as at first; until it is known the drone is flown as slowly as with an"
+        " unknown one",
+        _FAST,
+    ),
+    Hazard(
         "detector_killed",
         Trigger.DETECTOR_LOST,
         "the detector's channel closes, in the middle of an answer too",

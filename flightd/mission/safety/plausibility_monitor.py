@@ -102,6 +102,7 @@ class PlausibilityMonitor:
             headroom_m=self._ceiling_m - height_m,
             outside_m=outside_m,
             line_m=line_m,
+            delay_leaps=tracker.delay_leaps,
             tick_s=self._tick_s,
             health=health,
         )

@@ -21,8 +21,8 @@ def front_lens(width_px: int = 1280, height_px: int = 800, focal_px: float = 100
 
 @dataclass(frozen=True, slots=True)
 class FrontCamera:
-    """A forward camera.  A frame reaches the daemon `capture_delay_s` after mid-exposure, give or take a
-    normal `jitter_s`.  `focus_m` is in focus; `aperture_m` is the lens's opening, which blurs the rest."""
+    """A forward camera.  A frame reaches the daemon `capture_delay_s` after mid-exposure, and up to
+    `jitter_s` later.  `focus_m` is in focus; `aperture_m` is the lens's opening, which blurs the rest."""
 
     lens: Lens = field(default_factory=front_lens)
     mount: ForwardMount = field(default_factory=ForwardMount)

@@ -57,7 +57,7 @@ class CameraFault(OfCamera):
 
 class CameraLate(OfCamera):
     kind: Literal["camera_late"]
-    delay_s: float = Field(0.9, gt=0, le=5, description="on top of the capture delay")
+    delay_s: float = Field(0.9, ge=-0.05, le=5, description="on top of the capture delay; below 0: sooner")
 
 
 class CameraDisordered(OfCamera):

@@ -124,7 +124,8 @@ class CameraPeer:
     `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them.
 
     `make` is called in the rendering process (it must be picklable); `seed` draws the delivery's jitter.
-    While `wanted` says no, no picture is taken; `lamp` is that of `PictureMaker`.  Time is held by `hold`
+    While `wanted` says no, no picture is taken; `lamp` is that of `PictureMaker`; by `leap[0]` all
+    pictures come later from `leap[1]` (s) after the first on.  Time is held by `hold`
     while one is being drawn.  A renderer that fails ends it with a RunError that has the camera's `name`: a
     flight that goes on blind for a fault of its world tells nothing."""
 
@@ -141,8 +142,9 @@ class CameraPeer:
         hold: Hold = contextlib.nullcontext,
         name: str = "camera",
         lamp: Callable[[], float] = float,
+        leap: tuple[float, float] = (0.0, math.inf),
     ) -> None:
-        self._name = name
+        self._name, self._leap = name, leap
         self._lamp = lamp
         self._wanted = wanted
         self._hold = hold
@@ -189,7 +191,8 @@ class CameraPeer:
     async def _expose(self, child: Child, transport: Any, pictures: asyncio.TaskGroup) -> None:
         """Take a picture each period; each is rendered and delivered by a task of its own."""
         period_ns = self._period_ns
-        exposure_ns = self._clock.now_ns()
+        leap_s, leap_at_s = self._leap
+        exposure_ns = began_ns = self._clock.now_ns()
         seq = 0
         while True:
             exposure_ns += period_ns
@@ -206,6 +209,7 @@ class CameraPeer:
                 truth = self._truth_at(exposure_ns)
                 straggles = seq % self.trouble.straggler_every == 0
                 late_s = self.trouble.late_s + (self.trouble.straggler_s if straggles else 0.0)
+                late_s += leap_s if (exposure_ns - began_ns) * 1e-9 > leap_at_s else 0.0
                 due_ns += round(late_s * 1e9)
                 how = replace(self._how, lamp=self._lamp())
                 pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, how))

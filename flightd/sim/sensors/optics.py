@@ -38,8 +38,8 @@ def wide_lens(width_px: int = 640, height_px: int = 360, hfov_rad: float = math.
 @dataclass(frozen=True, slots=True)
 class SimCamera:
     """A down camera: its optics and its timing.  A frame reaches the daemon `capture_delay_s` after
-    mid-exposure of the middle row, give or take a normal `jitter_s`; the rows are exposed one after the other
-    within `readout_s`."""
+    mid-exposure of the middle row, and up to `jitter_s` later, drawn evenly; the rows are exposed one after
+    the other within `readout_s`."""
 
     lens: Lens = field(default_factory=wide_lens)
     mount: Mount = field(default_factory=Mount)

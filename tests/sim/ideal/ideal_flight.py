@@ -75,6 +75,8 @@ class Faults:
     blank: bool = False
     bare: bool = False
     late_ns: int = 0
+    delay_ns: int = 0
+    """The camera's delay is another one by so much: frames come so much later, and are stamped so."""
     stall_ns: int = 0
     """No tick for so long; the setpoint before holds, what comes meanwhile waits."""
     silent: bool = False
@@ -149,7 +151,7 @@ class IdealFlight:
         if carried_to:
             x_m, y_m = site.nodes[carried_to].x_m, site.nodes[carried_to].y_m
         self._armed = False
-        self._now_ns = 1_000_000_000_000
+        self._now_ns = self._began_ns = 1_000_000_000_000
         unknown = unknowns or Unknowns()
         frame = unknown.airframe(airframe or AirframeParams())
         wash = unknown.wash(world, seed)
@@ -159,6 +161,7 @@ class IdealFlight:
         self._eye = IdealEye(world, camera.lens, camera.mount, errors, seed)
         self._shaken = Shaken(unknown.shake_rad, seed)
         self._camera_off_ns = round(unknown.camera_delay_s * 1e9)
+        self._leap_ns, self._leaps_ns = round(unknown.camera_leap_s * 1e9), unknown.camera_leap_at_s * 1e9
         self._jitter_s, self._jitter = unknown.camera_jitter_s, random.Random(f"jitter {seed}")
         self._climb = ClimbLoop(ClimbGains(hover_guess=frame.hover_collective))
         self._delay_ns = delay_ns
@@ -232,7 +235,7 @@ class IdealFlight:
                 seq += 1
                 if not self.faults.blind:
                     late_ns = self.faults.late_ns + round(self._jitter.random() * self._jitter_s * 1e9)
-                    due_ns = self._now_ns + self._delay_ns + self._camera_off_ns + late_ns
+                    due_ns = self._now_ns + self._delay_ns + self._off_ns + late_ns
                     vision.put(due_ns, self._see(seq))
             self._photograph()
             if self._now_ns >= tick_ns:
@@ -316,10 +319,15 @@ class IdealFlight:
         )
         self.sensors.update(dt_s, self.airframe)
 
+    @property
+    def _off_ns(self) -> int:
+        leapt_ns = self._leap_ns if self._now_ns - self._began_ns > self._leaps_ns else 0
+        return self._camera_off_ns + self.faults.delay_ns + leapt_ns
+
     def _see(self, seq: int) -> LineSet:
         faults = self.faults
         pose = self._shaken(self.airframe.kinematics(self._now_ns))
-        seen = self._eye.see(pose, seq, self._now_ns + self._camera_off_ns)
+        seen = self._eye.see(pose, seq, self._now_ns + self._off_ns)
         seen = replace(seen, picture=PictureCheck(seq, 120.0, 40.0))
         if faults.bare:
             seen = replace(seen, lines=())

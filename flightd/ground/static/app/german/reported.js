@@ -203,6 +203,7 @@ export default {
   "route done": "Weg beendet",
   "battery low": "Akku schwach",
   "a detector process was replaced": "ein Erkennungsprozess wurde ersetzt",
+  "the camera's delay is another one": "die Verzögerung der Kamera ist eine andere",
   "the log's writer was started again": "die Aufzeichnung wurde neu gestartet",
   "a plan ordered": "Plan befohlen",
   "start ordered": "Start befohlen",
