@@ -26,10 +26,10 @@ from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.ground_squares import placed_squares
 from flightd.tracking.gyro_judge import GyroJudge
 from flightd.tracking.heading_dispute import HeadingDispute, Turned
+from flightd.tracking.heading_vote import heading_vote
 from flightd.tracking.line_sight import (
     FeatureSight,
     Rates,
-    agrees,
     as_compensated,
     feature_sight,
     line_sight,
@@ -467,13 +467,10 @@ class LineTracker:
         )
 
     def _settle_dispute(self, on_floor: list[GroundLine], attitude: Attitude) -> None:
-        """Believe lines that all contradict the heading for long: it, or the camera's mount, has turned."""
+        """Believe lines that outvote the heading for long: it, or the camera's mount, has turned."""
         held = self._filter
         yaw, sigma = attitude.yaw_rad + held.mean(PSI), held.sigma(PSI)
         turns = [turn_of(line, yaw) for line in on_floor]
-        agreed = any(
-            agrees(turn, line.sigma_theta_rad, sigma) for turn, line in zip(turns, on_floor, strict=True)
-        )
         carried, told = self._carried_heading, self._as_told.at(attitude.stamp_ns)
         if told is not None and not carried.gyros_wrong:
             offset_rad, parted = wrap_pi(yaw - told.yaw_rad), carried.leapt_lately
@@ -481,7 +478,8 @@ class LineTracker:
             if right_rad is not None:
                 carried.distrust()
                 held.turn_to(right_rad, self._params.start_yaw_sigma_rad)
-        turned = self._dispute.step([-turn for turn in turns], agreed, attitude.stamp_ns)
+        vote = heading_vote(on_floor, yaw, sigma, self._dispute.error_rad)
+        turned = self._dispute.step(vote, attitude.stamp_ns)
         if turned is Turned.CAMERA:
             self._knocked = True
             held.turn_mount_by(self._dispute.error_rad)
