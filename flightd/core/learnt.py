@@ -6,6 +6,11 @@ import enum
 import math
 from dataclasses import dataclass
 
+from flightd.core.tracks import SensorEstimate
+
+DELAY_UNSEEN_S = 0.002
+"""What the shake of frames makes of their delay, and no row tells: usual flights err to one side by it."""
+
 
 class Learnt(enum.IntEnum):
     """What can be wrong with the sensors, beyond the configuration, in the order of the numbers.
@@ -40,3 +45,30 @@ class LearntSensors:
     def sigma(self, what: Learnt) -> float:
         """Standard deviation."""
         return math.sqrt(max(self.covariance[what * (len(Learnt) + 1)], 0.0))
+
+    @property
+    def delay_sigma_s(self) -> float:
+        """How well the delay of the frames is known: beside the filter's own doubt, by what it cannot see."""
+        return math.hypot(self.sigma(Learnt.DELAY), DELAY_UNSEEN_S)
+
+
+def estimate_of(learnt: LearntSensors, shake_rad: float = math.nan) -> SensorEstimate:
+    """The same for people."""
+    mean, sigma = learnt.mean, learnt.sigma
+    return SensorEstimate(
+        delay_s=mean(Learnt.DELAY),
+        delay_sigma_s=learnt.delay_sigma_s,
+        mount_roll_rad=mean(Learnt.MOUNT_ROLL),
+        mount_pitch_rad=mean(Learnt.MOUNT_PITCH),
+        mount_sigma_rad=max(sigma(Learnt.MOUNT_ROLL), sigma(Learnt.MOUNT_PITCH)),
+        mount_yaw_rad=mean(Learnt.MOUNT_YAW),
+        mount_yaw_sigma_rad=sigma(Learnt.MOUNT_YAW),
+        tilt_roll_rad=mean(Learnt.ROLL),
+        tilt_pitch_rad=mean(Learnt.PITCH),
+        tilt_sigma_rad=max(sigma(Learnt.ROLL), sigma(Learnt.PITCH)),
+        scale_share=mean(Learnt.SCALE),
+        scale_sigma=sigma(Learnt.SCALE),
+        height_share=mean(Learnt.HEIGHT_SCALE),
+        height_sigma=sigma(Learnt.HEIGHT_SCALE),
+        shake_rad=shake_rad,
+    )

@@ -9,7 +9,7 @@ from flightd.config.camera import CameraConfig
 from flightd.config.schema import Config
 from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
-from flightd.core.learnt import Learnt
+from flightd.core.learnt import estimate_of
 from flightd.doctor.check import Check, error, ok, warning
 from flightd.site.site import Site
 
@@ -72,14 +72,27 @@ def check_learnt(config: Config) -> list[Check]:
         return [error(_LEARNT, str(err), "the next flight writes it anew")]
     if learnt is None:
         return [ok(_LEARNT, "nothing yet of this camera, as it is configured")]
-    delay_s, sigma_s = -learnt.mean(Learnt.DELAY), learnt.sigma(Learnt.DELAY)
-    roll, pitch = (math.degrees(learnt.mean(one)) for one in (Learnt.MOUNT_ROLL, Learnt.MOUNT_PITCH))
-    mount_sigma = math.degrees(learnt.sigma(Learnt.MOUNT_ROLL))
-    height, height_sigma = learnt.mean(Learnt.HEIGHT_SCALE), learnt.sigma(Learnt.HEIGHT_SCALE)
+    seen = estimate_of(learnt)
+    delay_s, sigma_s = -seen.delay_s, seen.delay_sigma_s
+    roll, pitch, mount, yaw, yaw_sigma, leant, lent, tilt = map(
+        math.degrees,
+        (
+            seen.mount_roll_rad,
+            seen.mount_pitch_rad,
+            seen.mount_sigma_rad,
+            seen.mount_yaw_rad,
+            seen.mount_yaw_sigma_rad,
+            seen.tilt_roll_rad,
+            seen.tilt_pitch_rad,
+            seen.tilt_sigma_rad,
+        ),
+    )
+    height, height_sigma = seen.height_share, seen.height_sigma
     text = (
         f"beyond the configuration: delay {delay_s * 1e3:+.0f} ms (sigma {sigma_s * 1e3:.0f}), mount roll"
-        f" {roll:+.1f} and pitch {pitch:+.1f} deg (sigma {mount_sigma:.1f}),"
-        f" height {height:+.1%} (sigma {height_sigma:.1%})"
+        f" {roll:+.1f} pitch {pitch:+.1f} deg (sigma {mount:.1f}) yaw {yaw:+.1f} (sigma {yaw_sigma:.1f}),"
+        f" attitude {leant:+.1f} {lent:+.1f} deg (sigma {tilt:.1f}), focal length {seen.focal_share:+.1%}"
+        f" (sigma {seen.scale_sigma:.1%}), height {height:+.1%} (sigma {height_sigma:.1%})"
     )
     if abs(delay_s) >= max(_DELAY_S, 3.0 * sigma_s):
         latency_s = max(config.camera.latency_s + delay_s, 0.0)

@@ -19,7 +19,7 @@ import numpy as np
 
 from flightd.config.tracking import MotionNoise, SensorPriors
 from flightd.core.geometry import Matrix
-from flightd.core.learnt import LearntSensors
+from flightd.core.learnt import DELAY_UNSEEN_S, LearntSensors, estimate_of
 from flightd.core.tracks import SensorEstimate
 from flightd.tracking.first_doubt import LEAST_HEIGHT_SHARE, drift_of, first_sigmas
 from flightd.tracking.forgotten_lines import FEATURE_NS, forgotten_features, forgotten_lines
@@ -36,8 +36,6 @@ from flightd.tracking.motion_model import (
     HEIGHT_S,
     HEIGHT_SCALE,
     LEAK,
-    MOUNT_PITCH,
-    MOUNT_ROLL,
     MOUNT_YAW,
     PITCH,
     PSI,
@@ -69,8 +67,6 @@ _MOST_LEAK_PER_S = 1.0
 _MOST_SCALE = 0.5
 _MOST_SIGMAS = 4.0
 """A delay further off than so many sigmas of what was thought possible is not believed."""
-_DELAY_UNSEEN_S = 0.002
-"""What the shake of frames makes of their delay, and no row tells: usual flights err to one side by it."""
 _DELAY_LEAP_S = 0.02
 _OUTLIER_SIGMAS = 3.0
 """What errs by more is weighed less (Huber)."""
@@ -124,7 +120,7 @@ class FloorFilter:
     @property
     def delay_sigma_s(self) -> float:
         """How well the delay of the frames is known: beside the filter's own doubt, by what it cannot see."""
-        return math.hypot(self.sigma(DELAY), _DELAY_UNSEEN_S)
+        return math.hypot(self.sigma(DELAY), DELAY_UNSEEN_S)
 
     def without_errors(self) -> Matrix:
         """The first states, were the told attitude right."""
@@ -149,23 +145,7 @@ class FloorFilter:
 
     def sensors(self) -> SensorEstimate:
         """What is known of the sensors, for people."""
-        return SensorEstimate(
-            delay_s=self.mean(DELAY),
-            delay_sigma_s=self.delay_sigma_s,
-            mount_roll_rad=self.mean(MOUNT_ROLL),
-            mount_pitch_rad=self.mean(MOUNT_PITCH),
-            mount_sigma_rad=max(self.sigma(MOUNT_ROLL), self.sigma(MOUNT_PITCH)),
-            mount_yaw_rad=self.mean(MOUNT_YAW),
-            mount_yaw_sigma_rad=self.sigma(MOUNT_YAW),
-            tilt_roll_rad=self.mean(ROLL),
-            tilt_pitch_rad=self.mean(PITCH),
-            tilt_sigma_rad=max(self.sigma(ROLL), self.sigma(PITCH)),
-            scale_share=self.mean(SCALE),
-            scale_sigma=self.sigma(SCALE),
-            height_share=self.mean(HEIGHT_SCALE),
-            height_sigma=self.sigma(HEIGHT_SCALE),
-            shake_rad=self._innovations.shake_rad,
-        )
+        return estimate_of(self.learnt(), self._innovations.shake_rad)
 
     def learnt(self) -> LearntSensors:
         """What is known of the sensors, from `ROLL` to `HEIGHT_SCALE`."""

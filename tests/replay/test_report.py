@@ -3,7 +3,9 @@ from __future__ import annotations
 import base64
 import itertools
 import json
+import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -13,6 +15,7 @@ import pytest
 from flightd.adapters.recorder.recorder import McapRecorder
 from flightd.core.errors import InputError, UnavailableError
 from flightd.core.topics import Document, Topic
+from flightd.core.tracks import NOT_SEEN, SensorEstimate
 from flightd.core.types import Event, EventLevel, GridPose, Phase, Status
 from flightd.replay.report.charts import ChartLine, ChartStrip
 from flightd.replay.report.figures import key_figures, outcome
@@ -143,6 +146,34 @@ def test_the_summary_decides_the_key_figures(flight: RecordedFlight) -> None:
     assert 0.5 < float(figures["Position error"].value) < 3.0  # the noise of the made-up estimate
     assert figures["Codes read"].tone == "good"
     assert (figures["Nodes visited"].value, figures["Nodes visited"].tone) == ("12", "good")
+
+
+def test_what_was_found_wrong_with_the_sensors_is_told_with_its_sigmas(flight: RecordedFlight) -> None:
+    seen = SensorEstimate(
+        delay_s=-0.012,
+        delay_sigma_s=0.003,
+        mount_roll_rad=math.radians(1.0),
+        mount_pitch_rad=math.radians(-0.5),
+        mount_sigma_rad=math.radians(0.2),
+        tilt_roll_rad=math.radians(0.7),
+        tilt_pitch_rad=math.radians(-0.4),
+        tilt_sigma_rad=math.radians(0.3),
+        scale_share=0.02,
+        scale_sigma=0.004,
+        mount_yaw_rad=math.radians(2.0),
+        mount_yaw_sigma_rad=math.radians(0.1),
+        height_share=0.03,
+        height_sigma=0.005,
+    )
+    told = {figure.label: figure for figure in key_figures(replace(flight, sensors=seen))}
+    delay, tilt, height = told["Camera delay"], told["Tilt bias"], told["Height"]
+    assert (delay.value, delay.note.partition(",")[0]) == ("+12", "± 3")
+    assert "1 / -0.5° ± 0.2 off in roll and pitch, 2° ± 0.1 in yaw" in delay.note
+    assert (tilt.value, tilt.note.partition(",")[0]) == ("0.7 / -0.4", "± 0.3")
+    assert (height.value, height.note.partition(",")[0]) == ("+3.0", "± 0.5")
+    assert "focal length -2 % ± 0.4 more than configured" in height.note
+    before = {figure.label for figure in key_figures(replace(flight, sensors=NOT_SEEN))}
+    assert before.isdisjoint({"Camera delay", "Tilt bias", "Height"})
 
 
 def test_a_log_alone_makes_a_report_too(bare_log: Path) -> None:

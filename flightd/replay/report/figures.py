@@ -65,6 +65,7 @@ def key_figures(flight: RecordedFlight) -> tuple[Figure, ...]:
         _flight_time(flight),
         _latency(flight),
         _delay(flight),
+        _tilt_bias(flight),
         _scales(flight),
         _frames(flight),
         _battery(flight),
@@ -213,11 +214,24 @@ def _delay(flight: RecordedFlight) -> Figure | None:
     seen = flight.sensors
     if not seen.is_known:
         return None
-    mount = (seen.mount_roll_rad, seen.mount_pitch_rad, seen.mount_yaw_rad)
-    off = " / ".join("-" if math.isnan(angle) else number(math.degrees(angle), 1) for angle in mount)
     sigma = number(seen.delay_sigma_s * 1e3, 1)
-    note = f"± {sigma}, more than configured; mounted {off}° off in roll, pitch and yaw"
+    tilted = f"{_degrees(seen.mount_roll_rad, seen.mount_pitch_rad)}° ± {_degrees(seen.mount_sigma_rad)}"
+    turned = f"{_degrees(seen.mount_yaw_rad)}° ± {_degrees(seen.mount_yaw_sigma_rad)}"
+    note = f"± {sigma}, more than configured; mounted {tilted} off in roll and pitch, {turned} in yaw"
     return Figure("Camera delay", f"{-seen.delay_s * 1e3:+.0f}", "ms", note)
+
+
+def _tilt_bias(flight: RecordedFlight) -> Figure | None:
+    """What the lines found the told roll and pitch to be wrong by; None of a log that does not tell."""
+    seen = flight.sensors
+    if math.isnan(seen.tilt_sigma_rad):
+        return None
+    note = f"± {_degrees(seen.tilt_sigma_rad)}, told too small in roll and pitch at the end"
+    return Figure("Tilt bias", _degrees(seen.tilt_roll_rad, seen.tilt_pitch_rad), "°", note)
+
+
+def _degrees(*angles_rad: float) -> str:
+    return " / ".join("-" if math.isnan(angle) else number(math.degrees(angle), 1) for angle in angles_rad)
 
 
 def _scales(flight: RecordedFlight) -> Figure | None:
@@ -225,9 +239,9 @@ def _scales(flight: RecordedFlight) -> Figure | None:
     seen = flight.sensors
     if math.isnan(seen.height_share):
         return None
-    focal = number(100.0 * seen.focal_share, 1)
+    focal, focal_sigma = (number(100.0 * share, 1) for share in (seen.focal_share, seen.scale_sigma))
     sigma = number(100.0 * seen.height_sigma, 1)
-    note = f"± {sigma}, more than told; focal length {focal} % more than configured"
+    note = f"± {sigma}, more than told; focal length {focal} % ± {focal_sigma} more than configured"
     return Figure("Height", f"{100.0 * seen.height_share:+.1f}", "%", note)
 
 

@@ -19,7 +19,7 @@ from tests.rigs.event_loops import real
 CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
 SIGMAS = (0.01, 0.01, 0.02, 0.004, 0.004, 0.006, 0.003, 0.002, 0.01)
 LEARNT = LearntSensors(
-    (0.001, -0.002, 0.1, 0.017, -0.008, 0.01, -0.031, 0.0, 0.01),
+    (0.001, -0.002, 0.1, 0.017, -0.008, 0.01, -0.031, 0.01, 0.01),
     tuple(np.diag(np.square(SIGMAS)).ravel().tolist()),
 )
 
@@ -90,7 +90,9 @@ def test_the_doctor_tells_it_and_what_to_configure(tmp_path: Path) -> None:
     kept(path, config)
     (check,) = check_learnt(config)
     assert check.level is CheckLevel.WARNING
-    assert "+31 ms" in check.text
+    assert "delay +31 ms (sigma 4)" in check.text, "3 ms, and 2 ms that no line tells"
+    assert "mount roll +1.0 pitch -0.5 deg (sigma 0.2) yaw +0.6 (sigma 0.3)" in check.text
+    assert "attitude +0.1 -0.1 deg (sigma 0.6), focal length -1.0% (sigma 0.2%)" in check.text
     assert check.remedy == f"camera.latency_s = {CONFIG.camera.latency_s + 0.031:.3f}"
     means = list(LEARNT.means)
     means[Learnt.DELAY] = 0.004
