@@ -1,4 +1,4 @@
-"""The down camera: does it open, give the configured pictures at the configured rate, and are they of use?"""
+"""The cameras: do they open, give the configured pictures at the configured rate, and are they of use?"""
 
 from __future__ import annotations
 
@@ -8,16 +8,19 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 
 from flightd.adapters.camera.connect import connect_camera
+from flightd.config.camera import CameraConfig
+from flightd.config.front_camera import FrontCameraConfig
 from flightd.config.schema import Config
 from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.exposure import ExposureState
-from flightd.core.tick import CLOSEST_TICKS_S
 from flightd.core.types import Image
 from flightd.doctor.check import Check, error, ok, warning
 from flightd.doctor.picture_of import picture_of
+from flightd.mission.plan.flight_plan import counts_shelves
 from flightd.ports import Clock, TellsExposure, Vehicle
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.runtime.latest_slot import Latest
+from flightd.site.site import Site
 from flightd.vision.floor.brightness import Brightness, brightness_of
 from flightd.vision.line_detector import Detector
 
@@ -28,8 +31,6 @@ _SLOW = 0.85
 _DARK, _BRIGHT = 12.0, 243.0
 _BUSY = 0.8
 _TRIES = 3
-_NEAR = 0.8
-"""Of the latency that is allowed: what is measured here is not the slowest picture of a flight."""
 
 
 @dataclass(slots=True)
@@ -52,7 +53,9 @@ class Pictures:
         return (len(self.arrivals_ns) - 1) * 1e9 / max(self.arrivals_ns[-1] - self.arrivals_ns[0], 1)
 
 
-async def watch(config: Config, clock: Clock, vehicle: Vehicle | None) -> Pictures:
+async def watch(
+    config: CameraConfig | FrontCameraConfig, clock: Clock, vehicle: Vehicle | None = None
+) -> Pictures:
     """Let the camera run for some seconds.  InputError for a wrong address."""
     pictures = Pictures()
     first = asyncio.Event()
@@ -74,7 +77,7 @@ async def watch(config: Config, clock: Clock, vehicle: Vehicle | None) -> Pictur
     def complain(text: str) -> None:
         pictures.trouble = text
 
-    camera = connect_camera(config.camera, clock, take, complain, vehicle)
+    camera = connect_camera(config, clock, take, complain, vehicle)
     running = asyncio.ensure_future(camera.run())
     started = asyncio.ensure_future(first.wait())
     measuring = asyncio.ensure_future(measure())
@@ -105,6 +108,12 @@ async def brightness_series(tickets: Latest[FrameTicket]) -> AsyncIterator[Brigh
             yield await asyncio.to_thread(brightness_of, picture)
 
 
+async def watch_front(config: Config, clock: Clock) -> Pictures | None:
+    """The same of the front camera; None where there is none."""
+    front = config.front_camera
+    return await watch(front, clock) if front.is_fitted else None
+
+
 def judge_camera(config: Config, found: Pictures) -> list[Check]:
     """Size (pictures of another are refused by the adapter), rate and brightness."""
     camera, rate_hz = config.camera, found.rate_hz
@@ -133,12 +142,30 @@ def judge_camera(config: Config, found: Pictures) -> list[Check]:
     return checks
 
 
+def judge_front_camera(config: Config, site: Site, found: Pictures) -> Check:
+    """Size, as of the down camera, and rate.  Who counts no shelves flies without its pictures."""
+    name, camera, rate_hz = "front camera", config.front_camera, found.rate_hz
+    if not rate_hz:
+        text = found.trouble or f"{camera.url}: no picture in {_FIRST_S:g} s"
+        complaint = error if counts_shelves(config, site) else warning
+        remedy = "check front_camera.url, cable, rights (group video) and who else uses it"
+        return complaint(name, text, remedy)
+    text = f"{camera.url}: {camera.width_px}x{camera.height_px} px, {rate_hz:.1f} pictures a second"
+    if rate_hz < _SLOW * camera.fps:
+        remedy = f"front_camera.fps is {camera.fps:g}: more light, another size or format, or correct the key"
+        return warning(name, text, remedy)
+    if found.trouble:
+        remedy = "labels are placed by these times; flightd guide cameras says what is needed"
+        return warning(name, found.trouble, remedy)
+    return ok(name, text)
+
+
 def check_vision(config: Config, detector: Detector, picture: Image | None) -> list[Check]:
     """What the detector finds in a picture, and whether the detectors keep up with the camera."""
     name = f"{config.vision.method}, profile {detector.profile.name}"
     if picture is None:
         return [warning("vision", f"{name}: loads, had no picture to look at", "see the camera's line")]
-    best_s, lines = _look(detector, picture)
+    best_s, lines = look(detector, picture)
     text = f"{name}: {best_s * 1000:.0f} ms a picture, {lines} lines seen"
     busy = best_s * config.camera.fps / config.vision.workers
     checks = []
@@ -151,29 +178,7 @@ def check_vision(config: Config, detector: Detector, picture: Image | None) -> l
     return checks or [ok("vision", text)]
 
 
-def check_latency(config: Config, detector: Detector, found: Pictures) -> list[Check]:
-    """Whether setpoints are made soon enough after the exposure of what they are made from."""
-    if found.picture is None or not found.delays_s:
-        return []
-    most_s = config.hazards.latency_s
-    camera_s, (detector_s, _) = max(found.delays_s), _look(detector, found.picture)
-    whole_s = camera_s + detector_s + CLOSEST_TICKS_S
-    text = (
-        f"{whole_s * 1000:.0f} ms from exposure to setpoint: camera {camera_s * 1000:.0f},"
-        f" detector {detector_s * 1000:.0f}, up to {CLOSEST_TICKS_S * 1000:.0f} until the next tick"
-    )
-    remedy = (
-        f"hazards.latency_s allows {most_s * 1000:.0f} ms: a camera with less delay (camera.latency_s is its"
-        " measured share), smaller pictures, a faster computer"
-    )
-    if whole_s > most_s:
-        return [error("latency", text, remedy)]
-    if whole_s > _NEAR * most_s:
-        return [warning("latency", text, remedy)]
-    return [ok("latency", text)]
-
-
-def _look(detector: Detector, picture: Image) -> tuple[float, int]:
+def look(detector: Detector, picture: Image) -> tuple[float, int]:
     """The shortest time of some looks at a picture, s, and the lines in it."""
     best_s, lines = float("inf"), 0
     for _ in range(_TRIES):

@@ -27,16 +27,16 @@ _AGREES_S, _SIGMAS = 0.010, 3.0
 
 async def check_delay(
     config: Config, clock: Clock, detector: Detector, seconds: float, say: Callable[[str], None]
-) -> list[Check]:
+) -> tuple[Check, DelayByTilt | None]:
     """Look on for so long while the drone is rocked; `say` hears what a person is to do.  Whoever calls knows
-    that the vehicle is not armed."""
+    that the vehicle is not armed.  The delay itself is None where it could not be measured."""
     say(f"propellers off: {_HOW}, for {seconds:g} s from now")
     try:
         told = await _watched(config, clock, detector, seconds)
     except FlightdError as err:
-        return [error(_NAME, str(err), "mend what the lines of camera and vehicle say first")]
+        return error(_NAME, str(err), "mend what the lines of camera and vehicle say first"), None
     say("thank you, that is enough")
-    return [judge_delay(config.camera.latency_s, told)]
+    return judge_delay(config.camera.latency_s, told), told if told.is_known else None
 
 
 def judge_delay(configured_s: float, told: DelayByTilt) -> Check:

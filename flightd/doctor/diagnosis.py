@@ -17,11 +17,19 @@ from flightd.doctor import camera, machine, vehicle
 from flightd.doctor.calibration import check_calibration, check_learnt
 from flightd.doctor.check import Check, CheckLevel, ok, warning
 from flightd.doctor.delay import check_delay
-from flightd.doctor.exposure import Seen, check_exposure
+from flightd.doctor.exposure import Seen, check_exposure, check_front_exposure
 from flightd.doctor.ground import GroundListener, check_ground
 from flightd.doctor.label_text import check_text
 from flightd.doctor.labels import check_labels
 from flightd.doctor.lamp import check_lamp
+from flightd.doctor.latency import (
+    Stages,
+    delay_as_measured,
+    delay_before_a_flight,
+    judge_latency,
+    measure_stages,
+    with_latency,
+)
 from flightd.doctor.vehicle import Autopilot
 from flightd.ports import Clock
 from flightd.site.site import Site
@@ -45,11 +53,13 @@ class Subject:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """Everything that was looked at; `report` and `fixed` are those of a MAVLink autopilot."""
+    """Everything that was looked at; `report` and `fixed` are those of a MAVLink autopilot, `stages` what was
+    measured of the way from exposure to setpoint."""
 
     checks: Sequence[Check]
     report: ExaminationReport | None = None
     fixed: tuple[str, ...] = ()
+    stages: Stages | None = None
 
     @property
     def errors(self) -> int:
@@ -83,7 +93,7 @@ class Diagnosis:
 
 
 async def examine(subject: Subject) -> Diagnosis:
-    """Computer, camera, ground link and vehicle: some ten seconds.  InputError for wrong addresses, keys."""
+    """Computer, cameras, ground link and vehicle: some ten seconds.  InputError for wrong addresses, keys."""
     config = subject.config
     checks = [
         *_check_machine(subject),
@@ -91,19 +101,27 @@ async def examine(subject: Subject) -> Diagnosis:
         *check_learnt(config),
     ]
     autopilot = Autopilot(())
+    watching_front = camera.watch_front(config, subject.clock)  # beside the other, as in flight
     if config.vehicle.kind == "ardrone":
-        found, pictures = await _examine_ardrone(config, subject.clock)
+        (found, pictures), front = await asyncio.gather(
+            _examine_ardrone(config, subject.clock), watching_front
+        )
         checks += found
     else:
-        pictures = await camera.watch(config, subject.clock, None)
+        pictures, front = await asyncio.gather(camera.watch(config.camera, subject.clock), watching_front)
         autopilot = await vehicle.examine(config.vehicle, subject.clock, cells=config.battery.cells)
     checks += check_ground(config.ground, subject.ground)
     checks += camera.judge_camera(config, pictures)
     if pictures.rate_hz:
         checks += check_exposure(config, Seen(pictures.exposure, pictures.series, pictures.rate_hz))
     checks += camera.check_vision(config, subject.detector, pictures.picture)
-    checks += camera.check_latency(config, subject.detector, pictures)
-    return Diagnosis([*checks, *autopilot.checks], autopilot.report)
+    stages = measure_stages(config, subject.detector, pictures)
+    if stages is not None:
+        checks.append(judge_latency(config, stages, delay_before_a_flight(config)))
+    if front is not None:
+        checks.append(camera.judge_front_camera(config, subject.site, front))
+        checks += check_front_exposure(config, front.exposure) if front.rate_hz else []
+    return Diagnosis([*checks, *autopilot.checks], autopilot.report, stages=stages)
 
 
 async def examine_quickly(subject: Subject) -> Diagnosis:
@@ -120,8 +138,13 @@ async def measure_delay(
     if any(check.level is CheckLevel.ERROR for check in about):
         skipped = warning("delay", "not measured: see the lines of camera and vehicle", "mend those first")
         return replace(found, checks=[*found.checks, skipped])
-    checks = await check_delay(subject.config, subject.clock, subject.detector, seconds, say)
-    return replace(found, checks=[*found.checks, *checks])
+    config = subject.config
+    check, told = await check_delay(config, subject.clock, subject.detector, seconds, say)
+    checks = list(found.checks)
+    if told is not None and found.stages is not None:
+        latency = judge_latency(config, found.stages, delay_as_measured(config, told))
+        checks = with_latency(checks, latency)
+    return replace(found, checks=[*checks, check])
 
 
 async def fix_parameters(found: Diagnosis, config: Config, agreed: Sequence[str], clock: Clock) -> Diagnosis:
@@ -155,7 +178,7 @@ async def _examine_ardrone(config: Config, clock: Clock) -> tuple[list[Check], c
     flying = asyncio.ensure_future(drone.run())
     try:
         checks = await vehicle.examine_ardrone(drone, config)
-        return checks, await camera.watch(config, clock, drone)
+        return checks, await camera.watch(config.camera, clock, drone)
     finally:
         flying.cancel()
         await asyncio.wait([flying])

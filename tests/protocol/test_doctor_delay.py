@@ -106,8 +106,11 @@ def test_the_delay_is_measured_of_a_drone_that_is_rocked(
     with held_drone(port, math.radians(rocks_deg)) as url:
         done = flightd("doctor", "--config", str(_config(tmp_path, port, url)), "--rock", "8", "--json")
     assert done.stdout, done.stderr
-    check = next(check for check in json.loads(done.stdout)["checks"] if check["name"] == "delay")
+    checks = {check["name"]: check for check in json.loads(done.stdout)["checks"]}
+    check, latency = checks["delay"], checks["latency"]["text"]
     assert check["level"] == "warning"
+    assert ("as measured by rocking it" in latency) is bool(rocks_deg)
+    assert ("unmeasured" in latency) is not bool(rocks_deg)
     if rocks_deg:
         assert check["remedy"].startswith("camera.latency_s = ")
         assert float(check["remedy"].rpartition(" ")[2]) == pytest.approx(TRUE_S, abs=0.008)

@@ -23,15 +23,25 @@ from flightd.config.recorder import RecorderConfig
 from flightd.config.schema import Config, load_config
 from flightd.config.vehicle import VehicleConfig
 from flightd.doctor.calibration import check_calibration
-from flightd.doctor.camera import Pictures, check_latency, check_vision, judge_camera
+from flightd.doctor.camera import Pictures, check_vision, judge_camera, judge_front_camera
 from flightd.doctor.check import Check, CheckLevel
 from flightd.doctor.label_text import check_text
 from flightd.doctor.labels import check_labels
+from flightd.doctor.latency import (
+    KnownDelay,
+    Stages,
+    delay_as_measured,
+    delay_before_a_flight,
+    judge_latency,
+    measure_stages,
+)
 from flightd.doctor.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
 from flightd.doctor.vehicle import judge as judge_vehicle
 from flightd.site.site_file import load_site
+from flightd.tracking.delay_by_tilt import DelayByTilt
 from flightd.vision.line_detector import Detector
 from tests.unit.mission.shelves import FITTED
+from tests.unit.store.test_learnt_sensors import kept
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SITE = load_site(CONFIGS / "site-demo.toml")
@@ -149,20 +159,59 @@ def test_a_floor_without_lines_is_a_warning_only() -> None:
 
 
 @pytest.mark.parametrize(
-    ("delay_s", "expected"), [(0.02, CheckLevel.OK), (4.9, CheckLevel.WARNING), (5.1, CheckLevel.ERROR)]
+    ("late_s", "expected"), [(0.0, CheckLevel.OK), (4.7, CheckLevel.WARNING), (5.1, CheckLevel.ERROR)]
 )
 def test_pictures_that_come_too_late_to_fly_by_are_told_before_the_flight(
-    delay_s: float, expected: CheckLevel
+    late_s: float, expected: CheckLevel
 ) -> None:
     allowed = config().hazards.model_copy(update={"latency_s": 5.0})
-    found = pictures(30.0)
-    assert check_latency(config(), Detector("combined", "yellow"), found) == [], "nothing was measured"
-    found.delays_s += [0.01, delay_s]
-    checks = check_latency(
-        config().model_copy(update={"hazards": allowed}), Detector("combined", "yellow"), found
+    found, settings = pictures(30.0), config().model_copy(update={"hazards": allowed})
+    assert measure_stages(settings, Detector("combined", "yellow"), found) is None, "nothing was measured"
+    found.delays_s += [settings.camera.latency_s, settings.camera.latency_s + late_s]
+    stages = measure_stages(settings, Detector("combined", "yellow"), found)
+    assert stages is not None
+    assert stages.late_s == pytest.approx(late_s)
+    check = judge_latency(settings, stages, delay_before_a_flight(settings))
+    assert levels([check]) == [expected]
+    assert "hazards.latency_s" in check.remedy or expected is CheckLevel.OK
+
+
+def test_a_delay_that_is_configured_or_learnt_is_not_told_as_measured(tmp_path: Path) -> None:
+    stages = Stages(late_s=0.004, detector_s=0.01)
+    settings = config().with_values(tracking={"learnt": tmp_path / "sensors.json"})
+    configured_ms = settings.camera.latency_s * 1e3
+
+    def said(known: KnownDelay) -> str:
+        return judge_latency(settings, stages, known).text
+
+    assert f"camera {configured_ms + 4.0:.0f} (as camera.latency_s has it, unmeasured: --rock" in said(
+        delay_before_a_flight(settings)
     )
-    assert levels(checks) == [expected]
-    assert "hazards.latency_s" in checks[0].remedy or expected is CheckLevel.OK
+    kept(tmp_path / "sensors.json", settings)
+    assert f"camera {configured_ms + 35.0:.0f} (as learnt in flight, sigma 4: --rock" in said(
+        delay_before_a_flight(settings)
+    )
+    measured = delay_as_measured(settings, DelayByTilt(-0.02, 0.0015, 0.99, 0.1, 300))
+    assert f"camera {configured_ms + 24.0:.0f} (as measured by rocking it, sigma 1.5)" in said(measured)
+    (tmp_path / "sensors.json").write_text("{")
+    assert "unmeasured" in said(delay_before_a_flight(settings)), "the line of what was learnt says why"
+
+
+@pytest.mark.parametrize(
+    ("found", "counts", "level", "word"),
+    [
+        (pictures(4.0), True, CheckLevel.OK, "4.0 pictures a second"),
+        (pictures(2.0), True, CheckLevel.WARNING, "2.0 pictures a second"),
+        (replace(pictures(4.0), trouble="camera x: no time"), True, CheckLevel.WARNING, "no time"),
+        (Pictures(trouble="no such device"), True, CheckLevel.ERROR, "no such device"),
+        (Pictures(), False, CheckLevel.WARNING, "no picture in 6 s"),
+    ],
+)
+def test_the_front_cameras_pictures(found: Pictures, counts: bool, level: CheckLevel, word: str) -> None:
+    site = load_site(CONFIGS / "site-racks-small.toml") if counts else SITE
+    check = judge_front_camera(config().with_values(front_camera={"url": "device:/dev/video2"}), site, found)
+    assert levels([check]) == [level]
+    assert word in check.text
 
 
 def config() -> Config:
