@@ -95,7 +95,7 @@ def _by_widths(flights: Sequence[FlightState], line_width_m: float) -> list[Scal
 def _width_shares(flight: FlightState, line_width_m: float) -> list[float]:
     poses, mount = flight.poses(), flight.believed_mount()
     shares = []
-    for k, seen in enumerate(flight.record.frames):
+    for k, seen in enumerate(flight.frames):
         told_m = float(poses.height_m[k])
         attitude = Attitude(0, float(poses.roll_rad[k]), float(poses.pitch_rad[k]), 0.0)
         view = FloorView(flight.lens, mount, attitude, told_m, TiltCompensation.EXACT, 0.0)

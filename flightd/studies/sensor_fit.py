@@ -122,7 +122,7 @@ def _widths(flight: FlightState, line_width_m: float) -> list[tuple[float, float
     """(p² + 2 (n·p)², logarithm of the height by the width over the height) of each long line seen."""
     poses, mount, lens = flight.poses(), flight.believed_mount(), flight.lens
     found = []
-    for k, seen in enumerate(flight.record.frames):
+    for k, seen in enumerate(flight.frames):
         height_m = float(poses.height_m[k])
         attitude = Attitude(0, float(poses.roll_rad[k]), float(poses.pitch_rad[k]), 0.0)
         view = FloorView(lens, mount, attitude, height_m, TiltCompensation.EXACT, 0.0)

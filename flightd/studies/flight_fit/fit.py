@@ -16,6 +16,7 @@ from flightd.site.site import Site
 from flightd.studies.flight_fit.linearised import FlightState, Linearised, linearised
 from flightd.studies.flight_fit.motion import BELIEVED, LEAK_PER_S, PSI, SENSORS, STATES, Motion, Sensor, X, Y
 from flightd.studies.flight_fit.record import FlightRecord
+from flightd.studies.flight_fit.shutter import frames_of_one_moment
 from flightd.studies.flight_fit.sights import PaintedLines, Sights, associate
 
 _GATES_M = (0.45, 0.25, 0.12, 0.12)
@@ -80,9 +81,10 @@ def fit_flights(
     offset_m, angle_rad = np.zeros(len(lines.at_m)), np.zeros(len(lines.at_m))
     covariance, squares = np.zeros((0, 0)), np.zeros(0)
     for gate_m in _GATES_M:
-        for one in flights:
+        for one, config in zip(flights, configs, strict=True):
+            one.frames = frames_of_one_moment(one, config.camera.readout_s)
             one.sights = associate(
-                one.record, site, one.believed_lens(), one.believed_mount(), one.poses(), offset_m, gate_m
+                one.frames, site, one.believed_lens(), one.believed_mount(), one.poses(), offset_m, gate_m
             )
         for _ in range(_STEPS):
             try:
@@ -125,6 +127,7 @@ def _begun(record: FlightRecord, config: Config) -> FlightState:
         _SHAKE_RAD.copy(),
         sensors,
         nothing,
+        record.frames,
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.geometry import Lens, Matrix, Mount
+from flightd.core.types import LineSet
 from flightd.studies.flight_fit.bordered_chain import BorderedChain
 from flightd.studies.flight_fit.camera_model import SeenFrom, ends_off
 from flightd.studies.flight_fit.motion import (
@@ -43,7 +44,7 @@ _DELAY_STEP_S = 0.005
 class FlightState:
     """What is believed of one flight: `states` (K, n) of `motion`, `shakes` (K, 3) roll, pitch and yaw of
     each picture beside the airframe and their sigmas (3,), `sensors` (SENSORS,); `motion` goes from each
-    frame in `linked` to the next."""
+    frame in `linked` to the next; `frames` are the record's, as if all rows had been exposed at once."""
 
     record: FlightRecord
     lens: Lens
@@ -55,6 +56,7 @@ class FlightState:
     shake_rad: Matrix
     sensors: Matrix
     sights: Sights
+    frames: tuple[LineSet, ...]
 
     def poses(self) -> Poses:
         """The camera's body at each frame."""

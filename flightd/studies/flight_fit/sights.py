@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +11,9 @@ from numpy.typing import NDArray
 
 from flightd.config.control import TiltCompensation
 from flightd.core.geometry import Lens, Matrix, Mount
-from flightd.core.types import Attitude, Line
+from flightd.core.types import Attitude, Line, LineSet
 from flightd.site.painted_lines import PaintMap
 from flightd.site.site import Site
-from flightd.studies.flight_fit.record import FlightRecord
 from flightd.tracking.tilt_compensation import FloorView, ground_lines
 
 _PARALLEL_RAD = math.radians(8.0)
@@ -91,16 +91,22 @@ class Poses:
 
 
 def associate(
-    record: FlightRecord, site: Site, lens: Lens, mount: Mount, poses: Poses, off_m: Matrix, gate_m: float
+    frames: Sequence[LineSet],
+    site: Site,
+    lens: Lens,
+    mount: Mount,
+    poses: Poses,
+    off_m: Matrix,
+    gate_m: float,
 ) -> Sights:
     """The lines of each frame that are surely one of the map's, which lie (L,) `off_m` beside it as far as
     one knows, along x or y."""
     axes = PaintMap.of(site).axes
     split = len(axes[0].at_m)
     places = axes[0].at_m + off_m[:split], axes[1].at_m + off_m[split:]
-    frames, lines, ends, spreads = [], [], [], []
+    numbers, lines, ends, spreads = [], [], [], []
     low_m, high_m = (share * site.line_width_m for share in _WIDTHS)
-    for k, seen in enumerate(record.frames):
+    for k, seen in enumerate(frames):
         attitude = Attitude(0, float(poses.roll_rad[k]), float(poses.pitch_rad[k]), 0.0)
         view = FloorView(lens, mount, attitude, float(poses.height_m[k]), TiltCompensation.EXACT, 0.0)
         long = [line for line in seen.lines if line.span_px >= _LEAST_PX]
@@ -126,12 +132,12 @@ def associate(
                 if index not in taken or apart_m < taken[index][0]:
                     taken[index] = apart_m, line
         for index, (_, line) in taken.items():
-            frames.append(k)
+            numbers.append(k)
             lines.append(index)
             ends.append(_ends(line, lens))
             spreads.append(_spread(line))
     return Sights(
-        np.array(frames, np.int64),
+        np.array(numbers, np.int64),
         np.array(lines, np.int64),
         np.array(ends).reshape(-1, 2, 2),
         np.array(spreads).reshape(-1, 2, 2),
