@@ -1,4 +1,4 @@
-"""`flightd calibrate`: the down camera's lens by a chessboard, or all of a drone's sensors by a flight."""
+"""`flightd calibrate`: the down camera's lens by a board, or all of a drone's sensors by a flight."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ from flightd.core.errors import InputError
 
 if TYPE_CHECKING:
     from flightd.studies.sensor_fit_document import SensorRow
-    from flightd.vision.lens_calibration import Board
+    from flightd.vision.lens_calibration import Target
 
 EXAMPLES = """Examples:
   flightd calibrate boards/                     8 or more pictures of a 9x6 chessboard
   flightd calibrate walk.mp4 --board 7x5 --json
+  flightd calibrate boards/ --board 11x7 --charuco 4X4_50
   flightd calibrate --from-log out/sim/flight.mcap
 
 Print the board, glue it to something flat, and fill every part of the picture with it, tilted and turned.
+A chessboard counts where all of it is seen, a ChArUco board where a part is: it tells the edges better.
 
 A flight tells the camera's delay and mount, too: best one that hovers, goes fast, and turns by 90 degrees.
 """
@@ -37,6 +39,12 @@ def calibrate(
         list[Path] | None, typer.Argument(metavar="PATH…", help="Images, folders of them, and videos.")
     ] = None,
     board: Annotated[str, typer.Option(help="Inner corners, COLUMNSxROWS.")] = "9x6",
+    charuco: Annotated[
+        str,
+        typer.Option(
+            metavar="DICTIONARY", help="The board is a ChArUco one with these markers.", show_default=False
+        ),
+    ] = "",
     from_log: Annotated[
         Path | None, typer.Option(metavar="LOG", help="A flight log: estimate delay, mount and more by it.")
     ] = None,
@@ -45,12 +53,12 @@ def calibrate(
     """Calibrate the down camera; prints the `[camera]` keys for the configuration."""
     from flightd.studies.calibrate import calibrate_lens
 
-    if bool(paths) is (from_log is not None):
+    if bool(paths or charuco) is (from_log is not None):
         raise InputError("give pictures of a board, or --from-log LOG")
     if from_log is not None:
         _by_flight(from_log, as_json=as_json)
         return
-    found = calibrate_lens(paths or [], _board(board))
+    found = calibrate_lens(paths or [], _board(board, charuco))
     if as_json:
         print(json.dumps(found.document(), indent=2))
         return
@@ -95,11 +103,16 @@ def _print(rows: list[SensorRow], frames: int) -> None:
     stdout().print(table)
 
 
-def _board(text: str) -> Board:
+def _board(text: str, dictionary: str) -> Target:
+    from flightd.vision.charuco_board import CharucoBoard
     from flightd.vision.lens_calibration import Board
 
     match = re.fullmatch(r"(\d+)x(\d+)", text)
     if match is None or min(map(int, match.groups())) < 3 or max(map(int, match.groups())) > 50:
         remedy = "expected inner corners as COLUMNSxROWS, 3 to 50 each, for example 9x6"
         raise InputError(remedy, key=f"--board {text}")
-    return Board(int(match[1]), int(match[2]))
+    columns, rows = int(match[1]), int(match[2])
+    try:
+        return CharucoBoard(columns, rows, dictionary) if dictionary else Board(columns, rows)
+    except InputError as err:
+        raise InputError(str(err), key=f"--charuco {dictionary}") from None

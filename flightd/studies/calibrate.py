@@ -1,4 +1,4 @@
-"""A lens from pictures of a chessboard, as the keys of a configuration."""
+"""A lens from pictures of a board, as the keys of a configuration."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from flightd.core.errors import InputError
 from flightd.core.geometry import Lens
 from flightd.studies.frame_files import all_pictures
 from flightd.vision import lens_calibration
-from flightd.vision.lens_calibration import Board
+from flightd.vision.lens_calibration import Target
 
 _MOST_VIEWS = 60
 
 
 @dataclass(frozen=True, slots=True)
 class CalibratedLens:
-    """`keys` are those of a camera's section; `boards` of the `pictures` showed the whole board."""
+    """`keys` are those of a camera's section; `boards` of the `pictures` showed enough of the board."""
 
     pictures: int
     boards: int
@@ -36,17 +36,17 @@ class CalibratedLens:
         }
 
 
-def calibrate_lens(paths: Sequence[Path], board: Board) -> CalibratedLens:
-    """Calibrate on every picture of `paths` that shows the whole board.
+def calibrate_lens(paths: Sequence[Path], board: Target) -> CalibratedLens:
+    """Calibrate on every picture of `paths` that shows enough of the board.
 
     InputError when they differ in size, are too few, or do not say enough about the lens.
     """
     views, sizes, looked = [], set[tuple[int, int]](), 0
     for picture in all_pictures(paths, "looking for boards"):
         looked += 1
-        corners = lens_calibration.find_board(picture.bgr, board)
-        if corners is not None:
-            views.append(corners)
+        view = board.view_of(picture.bgr)
+        if view is not None:
+            views.append(view)
             sizes.add((picture.bgr.shape[1], picture.bgr.shape[0]))
     if len(sizes) > 1:
         raise InputError(f"the pictures differ in size ({', '.join(f'{w}x{h}' for w, h in sorted(sizes))})")

@@ -14,7 +14,7 @@ from flightd.core.errors import InputError
 from flightd.core.preview import CameraName
 from flightd.studies.calibrate import lens_keys
 from flightd.studies.frame_files import read_image
-from flightd.vision.lens_calibration import FEWEST_PICTURES, Board, calibrate, find_board
+from flightd.vision.lens_calibration import FEWEST_PICTURES, Board, BoardView, calibrate
 
 COVERAGE = (8, 6)
 """The picture in cells across and down: each should have seen a corner of the board."""
@@ -49,22 +49,23 @@ class BoardStudy(msgspec.Struct, frozen=True):
 
 def study_boards(folder: Path, files: Sequence[str], board: Board) -> BoardStudy:
     """In the reading process: the newest pictures that show the whole board, all of one size."""
-    views: list[NDArray[np.float32]] = []
+    views: list[BoardView] = []
     shown: list[str] = []
     width = height = 0
     looked = files[-_MOST_PICTURES:]
     for file in looked:
         bgr = read_image(folder / file)
-        corners = find_board(bgr, board)
-        if corners is None:
+        view = board.view_of(bgr)
+        if view is None:
             continue
         if views and (bgr.shape[1], bgr.shape[0]) != (width, height):
             raise InputError("the pictures of the board differ in size", remedy="take them with one camera")
         height, width = bgr.shape[:2]
-        views.append(corners)
+        views.append(view)
         shown.append(file)
-    coverage = _coverage(views, width, height)
-    parts = [[(float(x) / width, float(y) / height) for x, y in view] for view in views]
+    seen = [view.corners_px for view in views]
+    coverage = _coverage(seen, width, height)
+    parts = [[(float(x) / width, float(y) / height) for x, y in corners] for corners in seen]
     boards = [ShownBoard(file, corners) for file, corners in zip(shown, parts, strict=True)]
     plain = BoardStudy(len(looked), FEWEST_PICTURES, width, height, boards, coverage)
     try:
@@ -85,11 +86,11 @@ def study_boards(folder: Path, files: Sequence[str], board: Board) -> BoardStudy
     )
 
 
-def _coverage(views: Sequence[NDArray[np.float32]], width: int, height: int) -> list[list[int]]:
+def _coverage(seen: Sequence[NDArray[np.float32]], width: int, height: int) -> list[list[int]]:
     across, down = COVERAGE
-    if not views:
+    if not seen:
         return [[0] * across for _ in range(down)]
-    corners = np.concatenate(views)
+    corners = np.concatenate(seen)
     counts, _, _ = np.histogram2d(
         corners[:, 1], corners[:, 0], bins=(down, across), range=((0, height), (0, width))
     )
