@@ -29,6 +29,7 @@ EXAMPLES = """Examples:
   flightd sim --scenario all                   every hazard in turn, and one table
   flightd sim --world ideal                    a drone that is as its configuration says
   flightd sim --seeds 10                       ten flights, seeds 1 to 10, and one table
+  flightd sim --camera stream:h264             by video over the network, in real time
   flightd sim --set mission.heading=shelf --set control.tilt_compensation=none
 """
 
@@ -70,6 +71,13 @@ def sim(
     plant: Annotated[
         str, typer.Option(help="Whose airframe flies: own, or rotorpy (extra rotorpy).")
     ] = "own",
+    camera: Annotated[
+        str,
+        typer.Option(
+            help="How the down camera's pictures come: shared (memory), or in real time by RTP, stream:mjpeg"
+            " or stream:h264 (extra ardrone)."
+        ),
+    ] = "shared",
     out: Annotated[Path, typer.Option(help="Folder for log, report and summary.")] = Path("out/sim"),
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE over the configuration.")
@@ -90,7 +98,17 @@ def sim(
     from flightd.app.simulation.prepare import SimOptions
 
     options = SimOptions(
-        config, warehouse, seed, vehicle, speed, tuple(settings or ()), truth_url, vehicle_url, world, plant
+        config,
+        warehouse,
+        seed,
+        vehicle,
+        speed,
+        tuple(settings or ()),
+        truth_url,
+        vehicle_url,
+        world,
+        plant,
+        camera,
     )
     options.check()
     _fly_all(options, scenario or [], seeds, out, as_json=as_json)

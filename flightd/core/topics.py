@@ -23,8 +23,8 @@ from flightd.core.types import (
 
 
 class Topic(enum.StrEnum):
-    """Names of the streams in `flight.mcap`; TRUTH, UNKNOWNS, FAULT and ARMED are in the simulator's
-    `truth.mcap`.
+    """Names of the streams in `flight.mcap`; TRUTH, UNKNOWNS, FAULT, ARMED and EXPOSED (of streamed frames)
+    are in the simulator's `truth.mcap`.
 
     TICK and DECISION are all that the pilot was given and all that it answered (`core.tick.TickInput`,
     `core.tick.TickOutput`), so that a flight can be replayed; FAILURE is what a tick raised;
@@ -59,6 +59,7 @@ class Topic(enum.StrEnum):
     SCENARIO = "/scenario"
     FAULT = "/fault"
     ARMED = "/armed"
+    EXPOSED = "/exposed"
     UNKNOWNS = "/unknowns"
 
 

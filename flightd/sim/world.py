@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Literal, Protocol
@@ -41,6 +41,7 @@ from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.faults import FaultListener, WorldFaults, bare_boxes
 from flightd.sim.sensors.camera import CameraPeer, PictureMaker
+from flightd.sim.sensors.camera_path import CameraPath
 from flightd.sim.sensors.cheap_camera import FAITHFUL, CheapCamera, CheapParams
 from flightd.sim.sensors.instruments import Goods, SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
@@ -72,7 +73,8 @@ class WorldSpec:
     `faults` go wrong on the way.  A MAVLink autopilot is set up as the shipped parameter file says, but for
     `parameters`; its clock runs `clock_ppm` fast, its range finder measures from `range_least_m` on, and one
     beside it reads `second_range_m` more (None: there is none).  `unknowns` are what no configuration
-    tells of it all; `cheap` is what the down camera does by itself."""
+    tells of it all; `cheap` is what the down camera does by itself.  On `camera_path` its frames reach the
+    daemon, but for an AR.Drone's."""
 
     site: Site
     seed: int
@@ -83,6 +85,7 @@ class WorldSpec:
     start_yaw_rad: float = 0.0
     start_offset_m: tuple[float, float] = (0.0, 0.0)
     camera: SimCamera = field(default_factory=SimCamera)
+    camera_path: CameraPath = CameraPath.SHARED
     front: FrontSpec | None = None
     appearance: Appearance = DEFAULT
     wind: WindParams = field(default_factory=WindParams)
@@ -130,9 +133,11 @@ class World:
         hold: Hold = nullcontext,
     ) -> None:
         """`tell` hears of the faults that are not the world's own; time is held by `hold` while pictures are
-        being drawn.  InputError for a fault at an unknown node."""
+        being drawn.  InputError for a fault at an unknown node, UnavailableError without a video library that
+        is needed."""
         self._clock = clock
         self._recorder = recorder
+        self._opened = ExitStack()
         self._unknowns, self._floor = spec.unknowns, site_toml(spec.site)
         self._damage = spec.unknowns.paint_damage(spec.site, spec.seed)
         start = _placement(spec)
@@ -161,6 +166,8 @@ class World:
             def lamp() -> float:
                 return _LAMP if autopilot.lamp_lit else 0.0
 
+        if spec.camera_path.is_stream:
+            show = _streaming(spec, recorder, self._opened)
         serves = spec.pads != PadService() and not spec.truth_url
         self._charge_pads = ChargePads(spec.site, airframe, spec.pads) if serves else None
         self._cameras = {"camera": _down_camera(spec, self._damage, self.vehicle, clock, show, hold)}
@@ -200,6 +207,8 @@ class World:
                 opened()
         except ExceptionGroup as failures:
             raise _cause(failures) from failures
+        finally:
+            self._opened.close()
 
     def _at(self, now_ns: int) -> None:
         """Bring the vehicle up to the present."""
@@ -273,6 +282,26 @@ def _down_camera(
         hold=hold,
         leap=leap,
     )
+
+
+def _streaming(spec: WorldSpec, recorder: Recorder, opened: ExitStack) -> Callable[[Image, int], None]:
+    """Where the floor's pictures go to be streamed.  UnavailableError without the video library."""
+    try:
+        from flightd.sim.sensors.camera_stream import (  # noqa: PLC0415 - video needs an optional extra
+            CameraStream,
+            ExposedFrame,
+        )
+    except ModuleNotFoundError as err:
+        raise missing_extra("ardrone", f"--camera {spec.camera_path}") from err
+    camera = spec.camera
+    stream = CameraStream(spec.camera_path, spec.camera_address, camera.lens, camera.fps)
+    opened.callback(stream.close)
+
+    def send(bgr: Image, exposed_ns: int) -> None:
+        if stream.send(bgr, exposed_ns):
+            recorder.record(Topic.EXPOSED, exposed_ns, ExposedFrame(exposed_ns))
+
+    return send
 
 
 def _front_camera(

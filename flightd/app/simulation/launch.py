@@ -110,7 +110,7 @@ async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Si
             recorder=recorder,
             counting=counting,
             observers=[simulation.observer],
-            peers=peers_at(ports, config),
+            peers=peers_at(ports, config, simulation.camera),
             hold=hold,
             interlock=faults.interlock,
         )
@@ -140,7 +140,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
     end_on_signals(_this_task(), ended_by)
     clock, config, site = LoopClock(), simulation.config, simulation.site
     ports = free_ports(config)
-    peers = peers_at(ports, config)
+    peers = peers_at(ports, config, simulation.camera)
     identity = FlightIdentity.of(simulation.setting, _DRONE, clock.now_ns())
     if simulation.truth_url:
         peers = replace(peers, vehicle=config.vehicle.url)

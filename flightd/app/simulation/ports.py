@@ -9,6 +9,7 @@ from flightd.app.build import Peers
 from flightd.config.schema import Config
 from flightd.core.errors import UnavailableError
 from flightd.runtime.free_ports import free_ports as free_port_numbers
+from flightd.sim.sensors.camera_path import CameraPath
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +32,11 @@ def free_ports(config: Config) -> WorldPorts:
     return WorldPorts(tuple(ports[:vehicles]), ports[vehicles], front)
 
 
-def peers_at(ports: WorldPorts, config: Config) -> Peers:
-    """Where the daemon reaches this simulation's peers."""
+def peers_at(ports: WorldPorts, config: Config, camera: CameraPath) -> Peers:
+    """Where the daemon reaches this simulation's peers, the down camera by its path."""
     front_url = "" if ports.front_camera is None else f"udp://127.0.0.1:{ports.front_camera}"
     if config.vehicle.kind == "ardrone":
         query = "at={}&navdata={}&video={}&control={}".format(*ports.vehicle)
         return Peers(f"ardrone://127.0.0.1?{query}", ARDRONE_URL, front_url)
     vehicle_url = f"udpout://127.0.0.1:{ports.vehicle[0]}"
-    return Peers(vehicle_url, f"udp://127.0.0.1:{ports.camera}", front_url)
+    return Peers(vehicle_url, camera.url(ports.camera), front_url)

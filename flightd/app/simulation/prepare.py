@@ -16,6 +16,7 @@ from flightd.sim.external.external_simulator import truth_address
 from flightd.sim.plant.plant_kind import PlantKind
 from flightd.sim.racks.face_light import check_names
 from flightd.sim.scenario.scenario import Scenario
+from flightd.sim.sensors.camera_path import CameraPath
 from flightd.sim.unknowns import WorldKind, unknowns_of
 
 _FACTORS = 0.05, 50.0
@@ -35,6 +36,7 @@ class SimOptions:
     vehicle_url: str = ""
     world: str = WorldKind.USUAL
     plant: str = PlantKind.OWN
+    camera: str = CameraPath.SHARED
 
     def check(self) -> None:
         """InputError where options contradict each other."""
@@ -44,6 +46,9 @@ class SimOptions:
         if self.plant not in list(PlantKind):
             kinds = ", ".join(PlantKind)
             raise InputError(f"--plant {self.plant}: no such airframe; give one of {kinds}")
+        if self.camera not in list(CameraPath):
+            paths = ", ".join(CameraPath)
+            raise InputError(f"--camera {self.camera}: no such path of its frames; give one of {paths}")
         if self.truth_url and self.plant != PlantKind.OWN:
             raise InputError(f"--plant {self.plant}: with --truth-url the other simulator is the airframe")
         if bool(self.truth_url) is not bool(self.vehicle_url):
@@ -62,13 +67,21 @@ def prepare(
     `sweep_route` is the route where every scenario is flown in turn (`--set` text): then only those that need
     the clock go by it.  InputError for what cannot be flown."""
     options.check()
+    camera = CameraPath(options.camera)
     settings = [sweep_route, *options.settings] if sweep_route else options.settings
     config, site = simulator_config(
-        options.config, options.warehouse, scenario, settings, options.vehicle, options.vehicle_url
+        options.config,
+        options.warehouse,
+        scenario,
+        settings,
+        options.vehicle,
+        options.vehicle_url,
+        camera,
     )
+    _check_camera(camera, config.vehicle.kind, scenario)
     clock = scenario.needs_real_time
     wanted = None if sweep_route and not clock else options.speed
-    own_clock = _own_clock(config.vehicle.kind, options.truth_url)
+    own_clock = _own_clock(config.vehicle.kind, options.truth_url, camera)
     factor = _clocked(wanted, say) if clock and wanted in {None, "max"} else _factor(wanted, own_clock)
     if options.truth_url:
         truth_address(options.truth_url)
@@ -89,7 +102,22 @@ def prepare(
         order=order,
         unknowns=unknowns_of(WorldKind(options.world), options.seed),
         plant=PlantKind(options.plant),
+        camera=camera,
     )
+
+
+def _check_camera(path: CameraPath, vehicle: str, scenario: Scenario) -> None:
+    """InputError for frames that cannot reach the daemon so."""
+    if not path.is_stream:
+        return
+    if vehicle == "ardrone":
+        raise InputError(f"--camera {path}: an AR.Drone streams its pictures itself; leave --camera out")
+    lens = scenario.camera.camera().lens
+    if problem := path.problem(lens):
+        raise InputError(
+            f"--camera {path}: it carries pictures {problem}, not {lens.width_px}x{lens.height_px};"
+            " give another width_px and height_px in [camera] of a scenario (--scenario FILE)"
+        )
 
 
 def _say_what_is_off(config: Config, say: Callable[[str], None]) -> None:
@@ -100,9 +128,11 @@ def _say_what_is_off(config: Config, say: Callable[[str], None]) -> None:
         say("metrics.listen is off in lockstep; --speed 1 turns it on")
 
 
-def _own_clock(vehicle: str, truth_url: str) -> str:
+def _own_clock(vehicle: str, truth_url: str, camera: CameraPath) -> str:
     """Who keeps a clock of his own, which rules out lockstep; an empty text for nobody."""
-    return "MAVSDK" if vehicle == "mavsdk" else "an external simulator" if truth_url else ""
+    if vehicle == "mavsdk":
+        return "MAVSDK"
+    return "a stream" if camera.is_stream else "an external simulator" if truth_url else ""
 
 
 def _clocked(speed: str | None, say: Callable[[str], None]) -> float:
@@ -125,8 +155,10 @@ def _factor(speed: str | None, own_clock: str) -> float | None:
         raise InputError(
             f"--speed max: {own_clock} keeps a clock of its own; leave --speed out for real time"
         )
-    if own_clock == "MAVSDK" and factor != 1.0:
-        raise InputError(f"--speed {speed}: MAVSDK keeps a clock of its own; it flies with --speed 1 only")
+    if own_clock in {"MAVSDK", "a stream"} and factor != 1.0:
+        raise InputError(
+            f"--speed {speed}: {own_clock} keeps a clock of its own; it flies with --speed 1 only"
+        )
     if speed == "max":
         return None
     if not _FACTORS[0] <= factor <= _FACTORS[1]:

@@ -59,7 +59,7 @@ def _sigma(seen: SensorEstimate) -> Known:
 def _drawn(simulation: Simulation) -> Known:
     unknowns, configured = simulation.unknowns, simulation.scenario.camera.camera()
     roll_rad, pitch_rad = unknowns.tilt_bias_rad or (math.nan, math.nan)
-    delay_s = unknowns.camera(configured).capture_delay_s
+    delay_s = simulation.camera.latency_s(unknowns.camera(configured))
     down, up = unknowns.radio(simulation.scenario.vehicle.radio())
     is_autopilot = simulation.config.vehicle.kind in FIRMWARES and not simulation.truth_url
     late_s = 0.5 * (down.delay_s - up.delay_s) if is_autopilot else math.nan

@@ -23,6 +23,7 @@ from flightd.sim.autopilot.shipped_parameters import shipped_parameters
 from flightd.sim.plant.plant_kind import PlantKind
 from flightd.sim.racks.stock_truth import LocationTruth, stock_truth
 from flightd.sim.scenario.scenario import Scenario
+from flightd.sim.sensors.camera_path import CameraPath
 from flightd.sim.unknowns import NOTHING, Unknowns
 from flightd.sim.world import FrontSpec, WorldSpec
 from flightd.site.site import Site
@@ -48,6 +49,7 @@ class Simulation:
     """What this flight is to do; None: what the configuration says."""
     unknowns: Unknowns = NOTHING
     plant: PlantKind = PlantKind.OWN
+    camera: CameraPath = CameraPath.SHARED
 
     @property
     def flight_log(self) -> Path:
@@ -87,6 +89,7 @@ def world_spec(simulation: Simulation, ports: WorldPorts) -> WorldSpec:
         start_yaw_rad=order.start_yaw_rad + math.radians(scenario.vehicle.start_yaw_deg),
         start_offset_m=scenario.vehicle.start_offset_m,
         camera=replace(scenario.camera.camera(), mount=config.camera.mount()),
+        camera_path=simulation.camera,
         front=_front(simulation, ports.front_camera),
         appearance=simulation.unknowns.look(scenario.floor.surface(), told=scenario.floor.tells_appearance),
         wind=simulation.unknowns.wind(scenario.wind.params(), told=scenario.wind.tells_gusts),

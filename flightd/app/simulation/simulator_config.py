@@ -16,6 +16,7 @@ from flightd.config.schema import Config, load_table, parse_config
 from flightd.core.errors import InputError
 from flightd.sim.random_sites import random_site
 from flightd.sim.scenario.scenario import CameraScenario, FrontCameraScenario, Scenario
+from flightd.sim.sensors.camera_path import CameraPath
 from flightd.site.site import Site
 from flightd.site.site_file import load_site
 
@@ -31,13 +32,14 @@ def simulator_config(
     settings: Sequence[str] = (),
     vehicle: str | None = None,
     vehicle_url: str = "",
+    camera: CameraPath = CameraPath.SHARED,
 ) -> tuple[Config, Site]:
     """Configuration and site: the file (None: the shipped one) with the simulated cameras' keys, which hold
     unless one of the `settings` (KEY=VALUE) says otherwise, and with a front camera where there are racks.
     InputError names the file, the key or the option, and the remedy."""
     path = path or shipped("sim.toml")
     table = load_table(path)
-    for key, value in _camera_keys(scenario).items():
+    for key, value in _camera_keys(scenario, camera).items():
         _lay(table, key, value)
     if vehicle is not None:
         _lay(table, "vehicle.kind", vehicle)
@@ -126,11 +128,12 @@ def _is_section(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, BaseModel)
 
 
-def _camera_keys(scenario: Scenario) -> dict[str, Any]:
+def _camera_keys(scenario: Scenario, path: CameraPath) -> dict[str, Any]:
     """The calibration of the simulated cameras, as a configuration has it."""
     down, front = scenario.camera.camera(), scenario.front_camera.camera()
     return {
         **_calibration("camera", down),
+        "camera.latency_s": path.latency_s(down),
         "camera.readout_s": down.readout_s,
         **_calibration("front_camera", front),
         "front_camera.exposure_s": front.exposure_s,

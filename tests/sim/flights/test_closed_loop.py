@@ -69,6 +69,8 @@ def test_the_same_seed_flies_the_same_flight(recorded_flight: Path, tmp_path: Pa
         (["--vehicle", "zeppelin"], "vehicle.kind"),
         (["--vehicle", "mavsdk", "--speed", "max"], "leave --speed out"),
         (["--vehicle", "mavsdk", "--speed", "3"], "--speed 1"),
+        (["--camera", "stream:vhs"], "stream:h264"),
+        (["--camera", "stream:mjpeg", "--speed", "max"], "leave --speed out"),
     ],
 )
 def test_wrong_input_is_one_line_that_names_it(

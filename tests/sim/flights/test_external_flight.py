@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -19,44 +17,8 @@ from flightd.runtime.clock import LoopClock
 from flightd.sim.external.external_simulator import ExternalVehicle
 from flightd.sim.external.external_truth import Placement
 from tests.rigs.event_loops import real
-from tests.rigs.patience import COMMAND_S
-from tests.rigs.small_camera import at_once, small_camera_file
+from tests.rigs.real_time_flight import ROOT, flown, is_sound
 from tests.rigs.vehicles import Rig
-
-ROOT = Path(__file__).parents[3]
-SHORT = ("--set", 'mission.nodes=["A2"]', *at_once())
-
-
-def flown(folder: Path, *options: str) -> dict[str, Any]:
-    """By the small camera: more can be drawn in real time on a busy machine."""
-    command = [
-        sys.executable,
-        "-m",
-        "flightd",
-        "sim",
-        "--json",
-        *SHORT,
-        "--scenario",
-        str(small_camera_file(folder)),
-        "--out",
-        str(folder),
-        *options,
-    ]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=COMMAND_S, check=False)
-    assert done.returncode == 0, done.stderr
-    summary: dict[str, Any] = json.loads(done.stdout)
-    return summary
-
-
-def is_sound(summary: dict[str, Any]) -> bool:
-    """Looser than in lockstep: here the machine's load is part of the flight."""
-    return bool(
-        summary["mission"] == "completed"
-        and (summary["nodes_visited"], summary["nodes_miscounted"]) == (1, 0)
-        and summary["cross_track_rms_m"] <= 0.10
-        and summary["hover_error_p95_m"] <= 0.20
-        and summary["landed_error_m"] <= 0.20
-    )
 
 
 @contextmanager
