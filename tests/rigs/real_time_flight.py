@@ -16,7 +16,7 @@ SHORT = ("--set", 'mission.nodes=["A2"]', *at_once())
 
 
 def flown(folder: Path, *options: str, **camera: float) -> dict[str, Any]:
-    """The summary; what the flight leaves is in the folder.  `camera` are keys of the small camera's scenario."""
+    """The summary; what the flight leaves is in the folder.  `camera` are keys of the small camera."""
     command = [
         sys.executable,
         "-m",

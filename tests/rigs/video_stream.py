@@ -16,7 +16,7 @@ import numpy as np
 
 from flightd.core.types import Image
 
-WIDTH_PX, HEIGHT_PX = 320, 180
+WIDTH_PX, HEIGHT_PX = 320, 200
 _CELL_PX = 20
 _COLUMNS, _BITS = WIDTH_PX // _CELL_PX, 64
 _LATE = 0.2
@@ -47,7 +47,9 @@ def send(url: str, form: str, codec: str, rate_hz: float) -> None:
     assert isinstance(video, av.VideoStream)
     video.width, video.height = WIDTH_PX, HEIGHT_PX
     video.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
-    if codec != "mjpeg":
+    if codec == "mjpeg":
+        video.options = {"huffman": "default"}  # RTP carries no others
+    else:
         video.options = {"tune": "zerolatency", "preset": "ultrafast", "g": str(round(rate_hz / 2))}
     video.codec_context.time_base = _MICROSECONDS
     began_ns = due_ns = time.monotonic_ns()

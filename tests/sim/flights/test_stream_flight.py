@@ -44,8 +44,8 @@ def test_a_mission_is_flown_by_a_stream_whose_frames_have_the_time_of_their_expo
 
 
 def assert_true(folder: Path, path: CameraPath, summary: dict[str, Any]) -> None:
-    """Each stamp is that of an exposure, but for what the configuration does not know of the delay.  Where the
-    camera took none for a while, a stamp that is wrong by whole frames has no exposure near it."""
+    """Each stamp is that of an exposure, but for what the configuration does not know of the delay.  A stamp
+    wrong by whole frames has no exposure near it where the camera took none for a while."""
     camera = CameraScenario.model_validate(SMALL | RTP_SIZE).camera()
     unknown_ns = (summary["drawn"]["camera_delay_s"] - path.latency_s(camera)) * 1e9
     truth = read_log(folder / "truth.mcap", {Topic.EXPOSED}).entries
@@ -70,7 +70,7 @@ def assert_true(folder: Path, path: CameraPath, summary: dict[str, Any]) -> None
         (
             SimOptions(camera="stream:mjpeg"),
             {"height_px": 180},
-            "multiples of 8 up to 2040, not 640x180; give",
+            "of 8 up to 2040, not 640x180; give",
         ),
         (SimOptions(camera="stream:h264"), {"width_px": 321}, "even numbers, not 321x360; give"),
     ],

@@ -49,6 +49,7 @@ STREAMS = {
         "udp://127.0.0.1:{}", "udp://127.0.0.1:{}?pkt_size=1316", "mpegts", "libx264", 2
     ),
     "h264 by rtp": Stream("rtp://127.0.0.1:{}", "rtp://127.0.0.1:{}", "rtp_mpegts", "libx264", 2),
+    "mjpeg by rtp": Stream("rtp://127.0.0.1:{}", "rtp://127.0.0.1:{}", "rtp", "mjpeg", 0),
     "mjpeg by tcp": Stream("tcp://127.0.0.1:{}", "tcp://127.0.0.1:{}?listen=1", "nut", "mjpeg", 0),
 }
 
