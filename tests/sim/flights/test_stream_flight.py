@@ -60,6 +60,8 @@ def assert_true(folder: Path, path: CameraPath, summary: dict[str, Any]) -> None
         assert min(abs(stamp - edge_ns) for stamp in stamps_ns) < 2.5 * INTERVAL_NS, "flown by beside the gap"
     errors = [min(abs(stamp - one) for one in exposed_ns) / INTERVAL_NS for stamp in stamps_ns]
     assert max(errors) < 0.4, "true to a part of a frame's interval"
+    late_ns = (summary["estimated"]["camera_delay_s"] - summary["drawn"]["camera_delay_s"]) * 1e9
+    assert abs(late_ns) < 0.4 * INTERVAL_NS, "and so say the lines while the drone tilts"
 
 
 @pytest.mark.parametrize(
