@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import av
 
@@ -32,9 +31,11 @@ class CameraStream:
 
     def __init__(self, path: CameraPath, address: tuple[str, int], lens: Lens, fps: float) -> None:
         form = "rtp" if path is CameraPath.MJPEG else "rtp_mpegts"
-        self._output: Any = av.open("rtp://{}:{}".format(*address), "w", format=form)
+        self._output = av.open("rtp://{}:{}".format(*address), "w", format=form)
         codec = "mjpeg" if path is CameraPath.MJPEG else "libx264"
-        self._video = video = self._output.add_stream(codec, rate=round(fps))
+        video = self._output.add_stream(codec, rate=round(fps))
+        assert isinstance(video, av.VideoStream)
+        self._video = video
         video.width, video.height = lens.width_px, lens.height_px
         context = video.codec_context
         context.time_base, context.thread_count = _MICROSECONDS, 1
