@@ -90,6 +90,8 @@ class ReferenceGenerator:
         self.height_goal_m = 0.0
         """The height above the floor that is flown at or made for."""
         self._cruise_m = p.height_m
+        self._lost_at_m = 0.0
+        """Where a take-off saw a line last."""
         self._x = Profile(start[0], p.speed_mps, p.accel_mps2)
         self._y = Profile(start[1], p.speed_mps, p.accel_mps2)
         self._yaw = Profile(start[2], p.turn_rate_radps, p.expert.turn_accel_radps2)
@@ -99,7 +101,8 @@ class ReferenceGenerator:
     def take_off(self, height_m: float) -> None:
         """A climb begins from here."""
         self._steers = False
-        self._height.reset(0.0 if math.isnan(height_m) else height_m)
+        self._lost_at_m = 0.0 if math.isnan(height_m) else height_m
+        self._height.reset(self._lost_at_m)
 
     def land(self, *, by_itself: bool = False) -> None:
         """A landing begins; `by_itself`: the autopilot's own."""
@@ -138,8 +141,9 @@ class ReferenceGenerator:
             math.isnan(s.height_m)
             or s.telemetry_age_s > self._params.telemetry_hold_s
             or s.warnings.height_doubted
+            or (task.phase is Phase.TAKE_OFF and self._monitor.climbs_no_further(s))
         ):
-            self._height.reset(self._height.position)  # no climb by heights of the past
+            self._height.reset(self._height.position)  # no climb by heights of the past, nor blind
             climb = 0.0
         elif task.phase is Phase.HOLD and self._blind.is_blind:
             climb = -self._blind.sink_mps(s.height_m)
@@ -158,7 +162,7 @@ class ReferenceGenerator:
         picture has to widen faster than it leaves the lines behind; so does the end of a climb to a height
         that is no longer wanted."""
         expert, height, hurried = self._params.expert, self._height, self._hurried
-        self.height_goal_m = self._wanted_height_m(task)
+        self.height_goal_m = self._wanted_height_m(s, task)
         rises = task.phase is Phase.TAKE_OFF and s.height_m >= expert.steer_above_m
         climb_mps = max(height.velocity, 0.0)
         ends_m = height.position + climb_mps**2 / (2.0 * expert.climb_accel_mps2)
@@ -180,9 +184,15 @@ class ReferenceGenerator:
         known = (heard or seen) and s.pose is not None and not task.state.adopted
         return known and not task.state.stopped and task.phase is not Phase.TAKE_OFF
 
-    def _wanted_height_m(self, task: ReferenceTask) -> float:
-        """Flying height; a little more in search of lines that stay lost."""
+    def _wanted_height_m(self, s: MissionInputs, task: ReferenceTask) -> float:
+        """Flying height; only a little more in search of lines that stay lost, in a take-off too."""
         p, h = self._params, self._hazards
+        if task.phase is Phase.TAKE_OFF:
+            sees = s.by_pad or min(s.x_age_s, s.y_age_s) <= p.lines_hold_s
+            if sees or s.height_m < self._monitor.sees_from_m:
+                self._lost_at_m = s.height_m
+                return self._height_goal_m(task)
+            return min(self._height_goal_m(task), self._lost_at_m + h.expert.search_climb_m)
         if task.phase is Phase.RELOCATE:
             return self._relocator.height_m(self._height_goal_m(task))
         if task.phase is not Phase.HOLD or self._monitor.unseen_s < h.expert.search_s:

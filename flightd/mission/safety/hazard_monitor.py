@@ -31,8 +31,8 @@ _CLIMBS_UNSEEING_S = 1.0
 _OFF_FLOOR_M = 0.5
 """Below, a picture may well stay the same: of the pad itself, packed so that its noise is gone."""
 _RISES_UNSEEING_M, _RISES_UNSEEING_SHARE = 1.0, 0.65
-"""So high, or so far up to its flying height, goes a take-off that has not seen any line of the map: nothing
-steers it, and it drifts by the square of the time."""
+"""So high, or so far up to its flying height, goes a take-off that sees no line of the map: nothing steers
+it, and it drifts by the square of the time."""
 _SWINGS_LAND_S = 12.0
 """A drone that swings about its place, and does nothing worse, is held for so long: its loop has been slowed
 down, and corridor and push are judged by themselves."""
@@ -162,13 +162,12 @@ class HazardMonitor:
 
     def _pictures(self, s: MissionInputs, situation: FlightContext) -> _Conditions:
         tolerated_s, w = self._params.lines_hold_s, s.warnings
-        may_repeat = False
         if situation.takes_off:
             tolerated_s = max(tolerated_s, _CLIMBS_UNSEEING_S)
-            may_repeat = w.blank_s > 0.0 or not s.height_m > _OFF_FLOOR_M
+        by_floor = situation.takes_off and not s.height_m > _OFF_FLOOR_M
         return {
-            Trigger.CAMERA_FROZEN: (w.frozen_s > tolerated_s and not may_repeat, 0.0),
-            Trigger.CAMERA_BLIND: (w.blank_s > tolerated_s, 0.0),
+            Trigger.CAMERA_FROZEN: (w.frozen_s > tolerated_s and not by_floor, 0.0),
+            Trigger.CAMERA_BLIND: (w.blank_s > tolerated_s and not by_floor, 0.0),
             Trigger.FRAMES_STALE: (w.frame_age_s > tolerated_s, 0.0),
         }
 
@@ -200,15 +199,28 @@ class HazardMonitor:
         elif lost and self._unseen_ns is None:
             self._unseen_ns = s.now_ns
         self.unseen_s = 0.0 if self._unseen_ns is None else (s.now_ns - self._unseen_ns) * 1e-9
-        if situation.takes_off and self._rises_unseeing(s):
-            return {Trigger.NO_LINES}
+        if situation.takes_off:
+            return self._lost_in_take_off(s)
         if lost and (self.unseen_s > p.lines_land_s or self.blind.too_long):
             return {Trigger.LINES_LOST, Trigger.LINES_LOST_LONG}
         if lost:
             return {Trigger.LINES_LOST}
         return {Trigger.LINES_FOUND} if seen_s > p.lines_hold_s and not situation.paused else set()
 
-    def _rises_unseeing(self, s: MissionInputs) -> bool:
-        """No line was seen from the pad, nor its mat, though the picture is wide enough by now."""
-        seen = min(s.x_age_s, s.y_age_s) < math.inf or s.by_pad
-        return not seen and s.height_m > min(_RISES_UNSEEING_M, _RISES_UNSEEING_SHARE * self._params.height_m)
+    def climbs_no_further(self, s: MissionInputs) -> bool:
+        """A take-off goes up no more, off the floor with a camera that shows nothing: no climb would help."""
+        return self.blind.is_blind and s.height_m > _OFF_FLOOR_M
+
+    @property
+    def sees_from_m(self) -> float:
+        """From this height up the picture is wide enough for a line of the map, or the pad's mat."""
+        return min(_RISES_UNSEEING_M, _RISES_UNSEEING_SHARE * self._params.height_m)
+
+    def _lost_in_take_off(self, s: MissionInputs) -> set[Trigger]:
+        """Lines never seen from the pad, nor its mat, or lost for too long: nearer to the floor they come and
+        go."""
+        if s.by_pad or not s.height_m > self.sees_from_m:
+            return set()
+        if math.isinf(min(s.x_age_s, s.y_age_s)):
+            return {Trigger.NO_LINES}
+        return {Trigger.LINES_LOST_LONG} if self.blind.too_long else set()

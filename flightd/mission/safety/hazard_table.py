@@ -59,6 +59,7 @@ class Hazard:
 
 _FAST = "tests/sim/hazards/test_hazards.py"
 _HOLD = "brake, hold; on when it is over; land after `mission.lines_land_s`"
+_CLIMBING = "; a take-off above 0.5 m climbs no further at once, and lands after 1 s"
 _BLIND = (
     "brake by dead reckoning and sink to `hazards.expert.blind_m` at once; up and on when it is over; land"
     " after `hazards.expert.blind_land_s`"
@@ -275,11 +276,13 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.LINES_LOST,
         "no line of the map newer than `mission.lines_hold_s`, the followed one older than 0.8 s, and no"
         " features of the floor that carry the position on (`localisation.expert.by_features_m`), or the"
-        " position too uncertain; in a take-off no line and no mat seen from a metre up",
+        " position too uncertain; in a take-off no line and no mat seen from a metre up (0.65 of a lower"
+        " flying height), or not for `hazards.expert.search_land_s`",
         Action.HOLD,
         "brake by dead reckoning, hold; after `hazards.expert.search_s` climb by"
         " `hazards.expert.search_climb_m` to see more; land after `hazards.expert.search_land_s`, or with"
-        " glimpses after `mission.lines_land_s`; a take-off lands",
+        " glimpses after `mission.lines_land_s`; a take-off lands, and climbs by no more than"
+        " `hazards.expert.search_climb_m` meanwhile",
         _FAST,
     ),
     Hazard(
@@ -287,7 +290,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.CAMERA_FROZEN,
         "the same picture for `mission.lines_hold_s`; a repeated one is never used",
         Action.HOLD,
-        _BLIND + "; a take-off lands",
+        _BLIND + _CLIMBING,
         _FAST,
     ),
     Hazard(
@@ -295,7 +298,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.CAMERA_BLIND,
         "black, white or flat pictures for `mission.lines_hold_s`",
         Action.HOLD,
-        _BLIND,
+        _BLIND + _CLIMBING,
         _FAST,
     ),
     Hazard(
@@ -303,7 +306,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.FRAMES_STALE,
         "newest picture exposed more than `mission.lines_hold_s` ago",
         Action.HOLD,
-        _BLIND + "; a take-off lands; the camera is opened again",
+        _BLIND + _CLIMBING + "; the camera is opened again",
         _FAST,
     ),
     Hazard(
@@ -311,7 +314,7 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.FRAMES_STALE,
         "no picture at all: as stale ones",
         Action.HOLD,
-        _BLIND + "; a take-off lands; the camera is opened again",
+        _BLIND + _CLIMBING + "; the camera is opened again",
         _FAST,
     ),
     Hazard(
@@ -420,7 +423,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "disk_full",
         Trigger.RECORD_LOST,
-        "the disk refuses the flight log",
+        "the disk refuses the flight log, or keeps a writing process that was killed for 2 s, or a message"
+        " found no room in the last 3 s",
         Action.CONFIGURED,
         "`hazards.record_lost`: continue, hold, home or land; no hold outlasts the charge that the way back"
         " needs",
@@ -432,6 +436,15 @@ HAZARDS: tuple[Hazard, ...] = (
         "the log's writing process ends",
         Action.REPORT,
         "another goes on in the same file",
+        _FAST,
+    ),
+    Hazard(
+        "recorder_hung",
+        Trigger.RECORDER_DEAD,
+        "the log's writing process tells nothing for 6 s, a new one, which looks through the log first, for"
+        " 60 s",
+        Action.REPORT,
+        "killed; another goes on in the same file, with what waited",
         _FAST,
     ),
 )

@@ -201,10 +201,10 @@ def test_lines_that_only_flicker_end_in_a_landing() -> None:
 
 def test_a_view_lost_at_height_is_borne_as_long_as_any_however_long_the_climb_saw_no_line() -> None:
     flight = Flight(configured(climb_mps=0.2))
-    flight.set(x_age_s=60.0, y_age_s=60.0)
+    flight.set(x_age_s=60.0, y_age_s=60.0, by_pad=True)
     flight.to(Phase.TAKE_OFF)
     flight.run(60.0, lambda: flight.inputs.height_m > 1.35)
-    flight.set(x_age_s=0.0, y_age_s=0.0)  # but not for long enough to count as found
+    flight.set(x_age_s=0.0, y_age_s=0.0, by_pad=False)  # but not for long enough to count as found
     flight.to(Phase.ACQUIRE)
     flight.set(x_age_s=0.5, y_age_s=0.5)
     flight.run(1.0)
@@ -256,17 +256,57 @@ def test_a_take_off_whose_pictures_stop_lands() -> None:
 
 @pytest.mark.parametrize(
     ("height_m", "frozen_s", "blank_s", "lands"),
-    [(0.6, 1.1, 0.0, True), (0.6, 0.9, 0.0, False), (0.3, 9.0, 0.0, False), (0.6, 9.0, 9.0, False)],
+    [
+        (0.6, 1.1, 0.0, True),
+        (0.6, 0.9, 0.0, False),
+        (0.3, 9.0, 0.0, False),
+        (0.6, 9.0, 9.0, True),
+        (0.6, 0.0, 1.1, True),
+        (0.6, 0.0, 0.9, False),
+        (0.3, 9.0, 9.0, False),
+    ],
 )
-def test_a_take_off_whose_picture_repeats_itself_lands(
+def test_a_take_off_whose_picture_shows_nothing_new_lands(
     height_m: float, frozen_s: float, blank_s: float, lands: bool
 ) -> None:
-    """It climbed on without steering.  Near the pad, or black, a picture is allowed to be the same."""
+    """It climbed on without steering.  Near the pad a picture is allowed to be the same, or black."""
     flight = Flight()
     flight.to(Phase.TAKE_OFF)
     flight.run(3.0, lambda: flight.inputs.height_m > height_m)
     flight.set(warnings=replace(ALL_WELL, frozen_s=frozen_s, blank_s=blank_s))
     flight.run(0.1)
+    assert flight.phase is (Phase.LAND if lands else Phase.TAKE_OFF)
+
+
+@pytest.mark.parametrize("what", ["frozen_s", "blank_s", "frame_age_s"])
+def test_a_take_off_climbs_no_further_by_old_pictures(what: str) -> None:
+    flight = Flight(configured(height_m=4.2))
+    flight.to(Phase.TAKE_OFF)
+    flight.run(5.0, lambda: flight.inputs.height_m > 0.9)
+    flight.set(x_age_s=0.3, y_age_s=0.3, warnings=replace(ALL_WELL, **{what: 0.3}))
+    flight.run(0.5)
+    assert flight.phase is Phase.TAKE_OFF
+    assert flight.inputs.height_m < 0.95
+    flight.set(x_age_s=0.0, y_age_s=0.0, warnings=ALL_WELL)
+    flight.to(Phase.ACQUIRE)
+
+
+@pytest.mark.parametrize(
+    ("from_m", "age_s", "by_pad", "lands"),
+    [(1.1, 9.0, False, True), (1.1, 0.2, False, False), (1.1, 9.0, True, False), (0.5, 9.0, False, False)],
+)
+def test_a_take_off_that_lost_the_lines_it_saw_lands(
+    from_m: float, age_s: float, by_pad: bool, lands: bool
+) -> None:
+    """It climbed on to its flying height, however high.  Near the floor they come and go."""
+    flight = Flight(configured(height_m=4.2))
+    flight.to(Phase.TAKE_OFF)
+    flight.run(5.0, lambda: flight.inputs.height_m > from_m)
+    flight.set(x_age_s=age_s, y_age_s=age_s, by_pad=by_pad)
+    flight.run(0.9)
+    assert flight.phase is Phase.TAKE_OFF
+    assert not lands or flight.inputs.height_m < from_m + 0.5
+    flight.run(0.8 if lands else 0.02)
     assert flight.phase is (Phase.LAND if lands else Phase.TAKE_OFF)
 
 
