@@ -9,6 +9,8 @@ import select
 import socket
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -19,7 +21,16 @@ import msgspec
 
 import flightd
 from flightd.adapters.recorder.schemas import encode, picture_schema, schema_of
-from flightd.adapters.recorder.writer_protocol import HEADER, PICTURE_SEQ, Definition, Kind, WriterTally
+from flightd.adapters.recorder.writer_protocol import (
+    HEADER,
+    MESSAGES,
+    PICTURE_SEQ,
+    Definition,
+    Kind,
+    WriterTally,
+    frames_within,
+)
+from flightd.adapters.recorder.writer_watch import HUNG_S, WriterWatch
 from flightd.core.errors import UnavailableError
 from flightd.core.topics import RETAINED, Topic
 from flightd.core.types import Event, EventLevel
@@ -78,8 +89,9 @@ class McapRecorder:
     goes to the writing process by a non-blocking socket; `when_full` says what becomes of a message
     that finds it full.  Stamps are the caller's; wall time decides nothing.
 
-    `run` hands over what waits, and brings the writing process back when it died: the new one goes on
-    in the same file.  Without `run` the queue is handed over in larger pieces and by `close`.
+    `run` hands over what waits, kills a writing process that tells nothing for `hung_s`, and brings it back
+    when it died: the new one goes on in the same file, with what waited.  Without `run` the queue is handed
+    over in larger pieces and by `close`.
     """
 
     def __init__(
@@ -89,12 +101,22 @@ class McapRecorder:
         metadata: Mapping[str, str] | None = None,
         queue_bytes: int = QUEUE_BYTES,
         when_full: WhenFull = drop_newest,
+        hung_s: float = HUNG_S,
     ) -> None:
         """Open `path` for a new log; UnavailableError if it cannot be written."""
         self._path = path
         self._queue_bytes = queue_bytes
         self._when_full = when_full
         self._queue = bytearray()
+        self._sent = 0
+        """Bytes of the first frame in the queue that the socket has taken already."""
+        self._waiting = 0
+        """Messages in the queue."""
+        self._head_bytes = 0
+        """What of the queue's front repeats to a new writer what an earlier one knew."""
+        self._closed = False
+        self._watch = WriterWatch(hung_s)
+        self._starting = threading.Lock()
         self._channels: dict[str, int] = {}
         self._definitions: list[bytes] = []
         self._retained: dict[str, bytes] = {}
@@ -114,6 +136,7 @@ class McapRecorder:
         except OSError as err:
             raise UnavailableError(f"{path}: cannot write the flight log: {err.strerror}") from None
         self._metadata = _metadata({"version": flightd.__version__, **(metadata or {})})
+        self._queue += self._metadata
         self._start("create")
 
     @property
@@ -143,8 +166,9 @@ class McapRecorder:
 
     @property
     def error(self) -> str:
-        """Why the disk refused, "" while it does not."""
-        return self._tally.error
+        """Why the log is not written, "" while it is: the disk refuses or does not answer, or a message found
+        no room."""
+        return self._tally.error or self._watch.trouble(time.monotonic())
 
     def record(self, topic: str, stamp_ns: int, message: object) -> None:
         """Take a message: a dataclass of plain fields or a dict.  TypeError if it has no JSON form."""
@@ -157,7 +181,8 @@ class McapRecorder:
         frame = _frame(Kind.MESSAGE, channel, stamp_ns, payload)
         if topic in RETAINED:
             self._retained[topic] = frame
-        self._put(frame, self._queue_bytes)
+        if not self._put(frame, self._queue_bytes):
+            self._watch.refuse(time.monotonic())
 
     def image(self, topic: str, stamp_ns: int, seq: int, jpeg: bytes) -> None:
         """Take a JPEG picture, frame number `seq`, exposed at `stamp_ns`."""
@@ -179,30 +204,38 @@ class McapRecorder:
         return bool(writable) and self._child.poll() is None
 
     async def run(self) -> None:
-        """Hand over what waits, and bring the writing process back whenever it died, for ever.
+        """Hand over what waits, and bring the writing process back whenever it died or hangs, for ever.
 
-        A death is no error here: it costs messages (`dropped`), is written into the log as an event and
-        told by `restarts`, and the flight goes on."""
+        That is no error here: it costs messages (`dropped`), is written into the log as an event and told by
+        `restarts`, and the flight goes on.  One that the system cannot kill is trouble (`error`)."""
         while True:
             await asyncio.sleep(PUSH_S)
             self.push()
+            now_s = time.monotonic()
             if self._child.poll() is not None:
-                self._restart()
+                self._give_up()
+                await asyncio.to_thread(self._start, "resume")
                 await asyncio.sleep(RESTART_S)
+            elif self._watch.hangs(now_s):
+                self._watch.kill(now_s)
+                self._child.kill()
 
     def close(self) -> None:
         """Hand over everything, wait until the file is finished; idempotent.
 
         Blocks for up to CLOSE_S when the disk is slow; a writer that needs longer goes on by itself."""
-        if self._link.fileno() < 0:
-            return
+        with self._starting:
+            if self._closed:
+                return
+            self._closed = True
         if self._child.poll() is not None:
-            self._restart()
+            self._give_up()
+            self._start("resume")
         if self.dropped:
             self._queue += _metadata({"dropped": str(self.dropped)})
         with suppress(OSError):
             self._link.settimeout(CLOSE_S)
-            self._link.sendall(self._queue)
+            self._link.sendall(self._queue[self._sent :])
             self._queue.clear()
             self._link.shutdown(socket.SHUT_WR)
             while answer := self._link.recv(1 << 16):
@@ -228,24 +261,28 @@ class McapRecorder:
         self._queue += frame
         return channel
 
-    def _put(self, frame: bytes, limit: int) -> None:
+    def _put(self, frame: bytes, limit: int) -> bool:
+        """Whether there was room for it."""
         if len(self._queue) + len(frame) > limit:
             self.push()
             self._when_full(self, limit - len(frame))
             if len(self._queue) + len(frame) > limit:
                 self._refused += 1
-                return
+                return False
         self._accepted += 1
+        self._waiting += 1
         self._queue += frame
         if len(self._queue) >= _PUSH_BYTES:
             self.push()
+        return True
 
     def push(self) -> None:
         """Send what the socket takes now."""
         try:
             while self._queue:
-                sent = self._link.send(self._queue)
-                del self._queue[:sent]
+                with memoryview(self._queue) as queue, queue[self._sent :] as rest:
+                    sent = self._link.send(rest)
+                self._forget(self._sent + sent)
         except BlockingIOError:
             pass
         except OSError:  # the writing process is gone; `run` and `close` start another
@@ -255,35 +292,52 @@ class McapRecorder:
                 self._answers += answer
         self._read_answers()
 
+    def _forget(self, taken: int) -> None:
+        """The first bytes of the queue were taken: the whole frames among them wait no more."""
+        end = 0
+        for kind, frame_end in frames_within(self._queue, taken):
+            self._waiting -= kind in MESSAGES
+            end = frame_end
+        del self._queue[:end]
+        self._sent = taken - end
+        self._head_bytes = max(self._head_bytes - end, 0)
+
     def _read_answers(self) -> None:
         *lines, rest = self._answers.split(b"\n")
         self._answers = bytearray(rest)
         if lines:
+            self._watch.hear(time.monotonic())
             with suppress(msgspec.DecodeError):  # a line that did not fit the socket came in part
                 self._tally = msgspec.json.decode(lines[-1], type=WriterTally)
 
-    def _restart(self) -> None:
-        """Go on in the same file; what waited is given up, for its front may be half of a frame."""
+    def _give_up(self) -> None:
+        """Let a writer go that died, and get ready to go on in the same file; what it did not take wholly
+        waits for the next one."""
+        if self._link.fileno() < 0:
+            return
         self._link.close()
-        code = self._child.wait()
+        code, hung = self._child.wait(), self._watch.was_killed
         self._restarts += 1
-        self._accepted_before = self._accepted
+        self._forget(self._head_bytes)
+        self._accepted_before = self._accepted - self._waiting
         self._tally = WriterTally(found=self._tally.written, written=self._tally.written, lost=0, error="")
         self._answers.clear()
-        self._queue.clear()
-        self._start("resume")
-        self._queue += b"".join((*self._definitions, *self._retained.values()))
+        head = b"".join((self._metadata, *self._definitions, *self._retained.values()))
+        self._queue[:0], self._head_bytes = head, len(head)
         self._accepted += len(self._retained)
-        text = f"the writer of the flight log died (exit code {code}) and was started again"
+        self._waiting += len(self._retained)
+        why = "took nothing any more" if hung else f"died (exit code {code})"
+        text = f"the writer of the flight log {why} and was started again"
         event = Event(self._newest_ns, EventLevel.WARNING, "recorder_died", text)
         self.record(Topic.EVENT, self._newest_ns, event)
 
     def _start(self, how: str) -> None:
-        self._link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._link.setblocking(False)
+        """Begin a writing process; in a thread, beside whatever is recorded meanwhile."""
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
+        ours.setblocking(False)
         package_root = str(Path(flightd.__file__).parents[1])
         search_path = os.pathsep.join(filter(None, (package_root, os.environ.get("PYTHONPATH"))))
-        with theirs, undisturbed():
+        with self._starting, theirs, undisturbed():
             self._child = subprocess.Popen(  # noqa: S603
                 [
                     sys.executable,
@@ -297,7 +351,8 @@ class McapRecorder:
                 stdin=subprocess.DEVNULL,
                 env=os.environ | {"PYTHONPATH": search_path},
             )
-        self._queue += self._metadata
+            self._watch.begin(time.monotonic())
+            self._link = ours
 
 
 def _frame(kind: Kind, channel: int, stamp_ns: int, payload: bytes) -> bytes:

@@ -27,6 +27,10 @@ class Kind(enum.IntEnum):
     METADATA = 4
 
 
+MESSAGES = frozenset({Kind.MESSAGE, Kind.PICTURE})
+"""What is counted."""
+
+
 class Definition(msgspec.Struct, frozen=True):
     """A channel: its topic, and the name and JSON schema of its messages."""
 
@@ -52,6 +56,17 @@ class WireFrame(NamedTuple):
     channel: int
     stamp_ns: int
     payload: bytes
+
+
+def frames_within(buffer: bytearray, upto: int) -> Iterator[tuple[int, int]]:
+    """Kind and end of each frame that lies wholly within the first bytes of `buffer`."""
+    end = 0
+    while upto - end >= HEADER.size:
+        length, kind, _, _ = HEADER.unpack_from(buffer, end)
+        end += HEADER.size + length
+        if end > upto:
+            return
+        yield kind, end
 
 
 def take_frames(buffer: bytearray) -> Iterator[WireFrame]:

@@ -8,6 +8,7 @@ or a multiple of it; only then does the ground link run, whose sockets have thre
 from __future__ import annotations
 
 import asyncio
+import math
 import multiprocessing
 import signal
 from collections.abc import Coroutine
@@ -18,6 +19,7 @@ from typing import Any
 from flightd.adapters.ground_link.camera_optics import camera_optics
 from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.recorder.recorder import McapRecorder, WhenFull, drop_newest, wait_for_disk
+from flightd.adapters.recorder.writer_watch import HUNG_S
 from flightd.app.absent_parts import NO_GROUND
 from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
@@ -255,7 +257,8 @@ async def _within_limit(
 
 def _flight_recorder(simulation: Simulation, identity: FlightIdentity, when_full: WhenFull) -> McapRecorder:
     metadata = {**identity.metadata(), "seed": str(simulation.seed)}
-    recorder = McapRecorder(simulation.flight_log, metadata=metadata, when_full=when_full)
+    hung_s = math.inf if when_full is wait_for_disk else HUNG_S
+    recorder = McapRecorder(simulation.flight_log, metadata=metadata, when_full=when_full, hung_s=hung_s)
     now_ns = identity.clock_ns
     record_setting(recorder, now_ns, simulation.setting)
     recorder.record(Topic.SCENARIO, now_ns, Document(simulation.scenario.model_dump_json(indent=1)))

@@ -101,6 +101,8 @@ class LauncherFaults:
                 _signal(self._pool.pids, signal.SIGSTOP if on else signal.SIGCONT)
             case ProcessFault(kind="writer_killed") if on:
                 _signal((self._recorder.pid,), signal.SIGKILL)
+            case ProcessFault(kind="writer_hung") if on:
+                _signal((self._recorder.pid,), signal.SIGSTOP)
             case ProcessFault(kind="disk_full"):
                 self._fill_disk(on)
             case LoopStalled() if on:

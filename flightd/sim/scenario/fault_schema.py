@@ -243,11 +243,11 @@ class DetectorKilled(_Fault):
 
 
 class ProcessFault(_Fault):
-    """A detector is stopped (it hangs), the log's writer is killed, or its disk takes no more."""
+    """A detector is stopped (it hangs), the log's writer is killed or stopped, or its disk takes no more."""
 
     by_launcher = True
     real_time = True
-    kind: Literal["detector_hung", "writer_killed", "disk_full"]
+    kind: Literal["detector_hung", "writer_killed", "writer_hung", "disk_full"]
 
 
 class LoopStalled(_Fault):

@@ -133,6 +133,7 @@ TRIALS: dict[str, Trial] = {
     ),
     "disk_full": Trial(fault(health=Health(0.08, 0, 0, "No space left on device")), found_s=0.05),
     "recorder_dead": Trial(fault(health=Health(0.08, 0, 1)), ends=Phase.DONE, found_s=0.05),
+    "recorder_hung": Trial(fault(health=Health(0.08, 0, 2)), ends=Phase.DONE, found_s=0.05),
 }
 
 

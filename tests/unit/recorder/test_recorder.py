@@ -17,6 +17,7 @@ import pytest
 from flightd.adapters.recorder.mcap_repair import is_whole
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.adapters.recorder.schemas import schema_of
+from flightd.adapters.recorder.writer_watch import WriterWatch
 from flightd.adapters.vehicle.mavlink.refusal import OffFloor
 from flightd.core.errors import UnavailableError
 from flightd.core.refusal import RecordedRefusal
@@ -269,12 +270,75 @@ def test_what_died_with_the_writer_is_counted_as_dropped(tmp_path: Path) -> None
     os.kill(recorder.pid, signal.SIGSTOP)
     for index in range(10):
         recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
+    recorder.push()
     os.kill(recorder.pid, signal.SIGKILL)
     os.waitid(os.P_PID, recorder.pid, os.WEXITED | os.WNOWAIT)
     recorder.close()
     assert recorder.dropped == 10
     (told,) = read_log(tmp_path / "flight.mcap").entries
     assert told.topic == Topic.EVENT
+
+
+def test_a_writer_that_takes_nothing_is_killed_and_replaced(tmp_path: Path) -> None:
+    """It was left alone, and what found no room behind it was dropped; what waited for it is written now."""
+    path = tmp_path / "flight.mcap"
+
+    async def fly() -> McapRecorder:
+        recorder = McapRecorder(path, hung_s=2.5)
+        recorder.record(Topic.SETPOINT, 0, AttitudeSetpoint(0))
+        running = asyncio.create_task(recorder.run())
+        await until(lambda: recorder.written)
+        os.kill(recorder.pid, signal.SIGSTOP)
+        for seq in range(80):
+            recorder.image(Topic.FRAME, seq, seq, bytes(40_000))
+        recorder.record(Topic.SETPOINT, 1, AttitudeSetpoint(1))
+        await until(lambda: recorder.restarts)
+        recorder.record(Topic.SETPOINT, 2, AttitudeSetpoint(2))
+        running.cancel()
+        await asyncio.wait([running])
+        recorder.close()
+        return recorder
+
+    recorder = real(fly())
+    log = read_log(path)
+    assert log.damage == ""
+    assert [setpoint.stamp_ns for setpoint in log.messages(AttitudeSetpoint)] == [0, 1, 2]
+    frames = [frame.seq for frame in log.messages(RecordedFrame)]
+    assert frames == list(range(80 - len(frames), 80))
+    assert len(frames) > 60
+    (event,) = log.messages(Event)
+    assert event.text == "the writer of the flight log took nothing any more and was started again"
+    assert recorder.written == len(log.entries)
+    assert recorder.dropped == 80 - len(frames)
+    assert recorder.error == ""
+
+
+def test_messages_that_find_no_room_are_told_pictures_are_not(tmp_path: Path) -> None:
+    with McapRecorder(tmp_path / "flight.mcap", queue_bytes=1 << 20) as recorder:
+        os.kill(recorder.pid, signal.SIGSTOP)
+        for seq in range(40):
+            recorder.image(Topic.FRAME, seq, seq, bytes(40_000))
+        assert recorder.dropped > 0
+        assert recorder.error == ""
+        for index in range(20_000):
+            recorder.record(Topic.SETPOINT, index, AttitudeSetpoint(index))
+        assert recorder.error == "the disk takes less than is recorded"
+        os.kill(recorder.pid, signal.SIGCONT)
+
+
+def test_a_writer_that_cannot_be_killed_is_trouble() -> None:
+    watch = WriterWatch(hung_s=6.0)
+    watch.begin(0.0)
+    assert not watch.hangs(50.0)
+    watch.hear(51.0)
+    assert not watch.hangs(56.9)
+    assert watch.hangs(57.1)
+    watch.kill(57.1)
+    assert not watch.hangs(100.0)
+    assert watch.trouble(59.0) == ""
+    assert watch.trouble(59.2) == "the disk does not answer"
+    watch.begin(60.0)
+    assert watch.trouble(63.0) == ""
 
 
 KILLED_DAEMON = """
