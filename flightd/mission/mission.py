@@ -251,8 +251,7 @@ class Mission:
 
     def step(self, inputs: MissionInputs) -> Guidance:
         """Advance by one tick."""
-        self._armed = inputs.vehicle is not None and inputs.vehicle.armed
-        self._pose = inputs.pose
+        self._armed, self._pose = inputs.vehicle is not None and inputs.vehicle.armed, inputs.pose
         self._pass_by(inputs)
         doubts = self._relocator.step(inputs, self.phase, self._progress.phase_s(inputs.now_ns))
         if self._relocator.jumped:
@@ -281,7 +280,7 @@ class Mission:
             found |= self._lost(self._losses.of_ground_link, Trigger.GROUND_LOST, s.now_ns)
         if self._orders.paused:
             found.add(Trigger.HOLD)
-        self._heed_battery(s)
+        found |= self._heed_battery(s)
         if self._progress.timed_out(s, self.phase):
             found.add(Trigger.TIMED_OUT)
         if s.failed:
@@ -307,14 +306,15 @@ class Mission:
             found |= self._landed()
         return found - {Trigger.PILOT_TOOK} if self._progress.adopting(s, self.phase) else found
 
-    def _heed_battery(self, s: MissionInputs) -> None:
-        """Turn back, or end a pause on the way back, when the charge asks for it."""
+    def _heed_battery(self, s: MissionInputs) -> set[Trigger]:
+        """Turn back, or end a pause on the way back, when the charge asks for it; land when it is spent."""
         pressed = self._charging.presses
         self._turn_back(self._charging.step(s, self.state))
         if self._charging.presses and not pressed and self._orders.paused and self.state.returning:
             self._orders.paused = False
             text = "pause ended: the charge only just suffices for the way back"
             self._events.report(s.now_ns, EventLevel.WARNING, "battery", text)
+        return {Trigger.BATTERY_CRITICAL} if self._charging.is_spent(s) else set()
 
     def _landed(self) -> set[Trigger]:
         """What a landing on the pad is more than its end."""

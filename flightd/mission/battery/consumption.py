@@ -19,6 +19,7 @@ class BatteryGauge:
     _MOVED_FRAC = 0.04
 
     def __init__(self, flight_s: float) -> None:
+        self._flight_s = flight_s
         self._seen_s = self._BELIEF_S
         self._used_frac = self._believed_frac = self._BELIEF_S / flight_s
         self._begin: tuple[int, float] | None = None
@@ -40,6 +41,14 @@ class BatteryGauge:
         blended = used_frac / seen_s
         measured_s, measured_frac = seen_s - self._BELIEF_S, used_frac - self._believed_frac
         return max(blended, measured_frac / measured_s) if measured_frac >= self._MOVED_FRAC else blended
+
+    def sure_frac(self, now_ns: int) -> float:
+        """What is left of the last charge that was known in this flight, by no less than the configured
+        consumption since; NaN where none was."""
+        if self._now is None:
+            return math.nan
+        rate_per_s = max(self.rate_per_s, 1.0 / self._flight_s)
+        return self._now[1] - rate_per_s * (now_ns - self._now[0]) * 1e-9
 
     def _totals(self) -> tuple[float, float]:
         if self._begin is None or self._now is None:

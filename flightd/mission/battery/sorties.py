@@ -91,6 +91,10 @@ class Sorties:
         """Share of the full battery used per second in flight."""
         return self._gauge.rate_per_s
 
+    def sure_frac(self, now_ns: int) -> float:
+        """The charge that is surely left where it is not known any more; NaN where it never was."""
+        return self._gauge.sure_frac(now_ns)
+
     @property
     def charge_frac(self) -> float:
         """The newest charge, 0..1; 1 where none is known."""

@@ -18,6 +18,7 @@ from flightd.mission.scan.no_scan import AnyScanner
 from flightd.mission.triggers import Trigger
 from flightd.site.site import Site
 from flightd.site.ways import NoWayError
+from flightd.tracking.battery_charge import ChargeDoubt
 
 _ON_LEG = frozenset({Phase.FOLLOW, Phase.HOLD})
 
@@ -37,6 +38,7 @@ class BatterySwap:
         self._sorties = Sorties(site, Legs(site, policy, Pace.of(config.mission)), config.battery, scanner)
         self._swap = config.battery.swap
         self._cell_home_v = config.battery.cell_home_v
+        self._frozen_frac, self._land_frac = config.battery.frozen, config.mission.battery_land
         self._route = itinerary
         self._monitor = monitor
         self._short = False
@@ -94,6 +96,14 @@ class BatterySwap:
             self.presses = True
             return self._go_charge(s.now_ns, reason, in_need=False)
         return None
+
+    def is_spent(self, s: MissionInputs) -> bool:
+        """The charge is not known, and what it was has been flown: nobody may wait for it to be told."""
+        if s.charge.doubt is None:
+            return False
+        # one that stood still was believed until so much should have gone
+        behind = self._frozen_frac if s.charge.doubt is ChargeDoubt.FROZEN else 0.0
+        return self._sorties.sure_frac(s.now_ns) - behind < self._land_frac
 
     def _must_return(self, s: MissionInputs, state: State) -> ChargeShort | None:
         """Why it must turn back now by what is left of the leg, or of the one that a hold interrupted."""

@@ -196,7 +196,8 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard(
         "battery_critical",
         Trigger.BATTERY_CRITICAL,
-        "charge below `mission.battery_land`, or a cell below `battery.cell_land_v` for 2 s",
+        "charge below `mission.battery_land`, or a cell below `battery.cell_land_v` for 2 s; where the charge"
+        " is not known any more, the last one less what flying takes",
         Action.LAND,
         "land here",
         _FAST,

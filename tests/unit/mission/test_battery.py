@@ -55,6 +55,20 @@ def test_a_gauge_that_says_nothing_leaves_the_belief() -> None:
     assert gauge.rate_per_s == pytest.approx(1 / 500)
 
 
+def test_what_is_surely_left_falls_with_the_time_from_the_last_charge_known() -> None:
+    gauge = BatteryGauge(500.0)
+    assert math.isnan(gauge.sure_frac(0))
+    gauge.step(0, 0.8, True)
+    gauge.step(50 * S, 0.75, True)
+    gauge.step(60 * S, math.nan, True)
+    assert gauge.sure_frac(100 * S) == pytest.approx(0.65), "no less than what is configured"
+    gauge.step(100 * S, 0.55, True)
+    gauge.step(120 * S, math.nan, True)
+    assert gauge.sure_frac(140 * S) == pytest.approx(0.45), "as fast as it was seen to go"
+    gauge.step(150 * S, math.nan, False)
+    assert math.isnan(gauge.sure_frac(150 * S))
+
+
 def sorties(flight_s: float = 600.0) -> Sorties:
     return Sorties(LARGE, LEGS, BatteryConfig(flight_s=flight_s, reserve=0.1))
 

@@ -388,6 +388,21 @@ def test_a_charge_that_is_not_known_ends_a_hold() -> None:
     assert flight.mission.goal.node == SITE.home.node
 
 
+def test_a_pause_with_an_unknown_charge_ends_before_the_battery() -> None:
+    """It could last as long as a full battery does, whatever was left of this one."""
+    losses = {"hazards": {"battery_unknown": LossAction.HOME}}
+    flight = Flight(configured(BatteryConfig(flight_s=150.0)).with_values(**losses))
+    flight.to(Phase.FOLLOW)
+    flight.set(battery_frac=math.nan)
+    flight.run(0.1)
+    assert flight.mission.state.intent is Intent.HOME
+    flight.order(CommandKind.PAUSE)
+    flight.run(100.0)
+    assert flight.phase is Phase.HOLD
+    flight.to(Phase.LAND, 20.0)
+    assert flight.mission.reason == "battery critical"
+
+
 def test_home_is_refused_on_the_floor() -> None:
     flight = Flight(configured(autostart=False))
     flight.run(0.1)
