@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from flightd.adapters.vehicle.ardrone.navdata import (
     NavdataOrder,
     parse,
 )
+from flightd.adapters.vehicle.ardrone.telemetry import NavdataTelemetry
 from flightd.sim.ardrone.navdata_writer import ALL_OPTIONS, OPTION_BYTES, NavdataReport, bootstrap, packet
 
 REPORT = NavdataReport(
@@ -120,3 +122,12 @@ def test_one_absurd_number_does_not_silence_the_drone() -> None:
     assert order.accept(numbered(100), 0)
     assert not order.accept(numbered(0xFFFF0000), 5 * MS)
     assert order.accept(numbered(101), 10 * MS)
+
+
+def test_volts_that_are_told_no_longer_are_not_known() -> None:
+    """They stayed for ever what they were told last, whatever else the drone told."""
+    telemetry = NavdataTelemetry(0)
+    telemetry.observe(Navdata(DroneState(0), 1, False, battery_v=11.1), 1_000_000_000)
+    assert telemetry.battery_v(1_900_000_000) == 11.1
+    telemetry.observe(Navdata(DroneState(0), 2, False), 2_100_000_000)
+    assert math.isnan(telemetry.battery_v(2_100_000_000))

@@ -19,7 +19,7 @@ AIRBORNE = frozenset(
 _MAX_ATTITUDES = 1000
 _CLIMB_LAG_S = 0.2
 _JUMP_M = 0.5
-_CLIMB_STALE_NS = 1_000_000_000
+_CLIMB_STALE_NS = _VOLTS_STALE_NS = 1_000_000_000
 _JUMP_PATIENCE_NS = 300_000_000
 
 
@@ -44,7 +44,7 @@ class NavdataTelemetry:
         self.height_m = math.nan
         self.height_ns = 0
         self._climb_mps = 0.0
-        self.battery_v = math.nan
+        self._battery_v, self._battery_ns = math.nan, 0
 
     @property
     def major(self) -> int:
@@ -68,7 +68,7 @@ class NavdataTelemetry:
         self.state = packet.state
         self.arrival_ns = now_ns
         if packet.battery_v is not None:
-            self.battery_v = packet.battery_v
+            self._battery_v, self._battery_ns = packet.battery_v, now_ns
         if packet.demo is None:
             return
         self.demo, self.flight_ns = packet.demo, now_ns
@@ -88,6 +88,10 @@ class NavdataTelemetry:
         if not self.airborne:
             return 0.0
         return self._climb_mps if now_ns - self.height_ns <= _CLIMB_STALE_NS else math.nan
+
+    def battery_v(self, now_ns: int) -> float:
+        """Volts of the battery, NaN once no packet has told them for a second."""
+        return self._battery_v if now_ns - self._battery_ns <= _VOLTS_STALE_NS else math.nan
 
     def drain(self) -> list[Attitude]:
         """The attitude samples since the last call, oldest first."""

@@ -99,7 +99,7 @@ class ArDroneVehicle:
             armed=telemetry.airborne,
             landed=landed if linked else LandedState.UNKNOWN,
             battery_frac=demo.battery_percent / 100.0,
-            battery_v=telemetry.battery_v,
+            battery_v=telemetry.battery_v(now_ns),
             battery_stamp_ns=telemetry.flight_ns,
             battery_cells=_CELLS,
             heartbeat_ns=telemetry.arrival_ns,
