@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import logging
 import time
 from collections.abc import Callable
 from contextlib import AsyncExitStack, ExitStack, nullcontext
@@ -22,6 +22,8 @@ from flightd.ports import Clock
 from flightd.runtime.clock import Hold
 from flightd.site.site import Site
 from flightd.vision.shelf.text_reader import needs_extra
+
+_LOG = logging.getLogger(__name__)
 
 
 class FlightCount:
@@ -91,7 +93,7 @@ class FlightCount:
                     self._run,
                     utc_at_zero_ns,
                     clock,
-                    _to_stderr,
+                    _LOG.warning,
                     hold,
                     texts.put if texts else nobody,
                 )
@@ -104,10 +106,6 @@ class FlightCount:
             return None
         missing = needs_extra()
         if missing is not None:
-            _to_stderr(str(missing))
+            _LOG.warning("%s", missing)
             return None
-        return self._stack.enter_context(TextSearcher(store, self._scan.text, _to_stderr, hold))
-
-
-def _to_stderr(text: str) -> None:
-    print(f"flightd: {text}", file=sys.stderr)
+        return self._stack.enter_context(TextSearcher(store, self._scan.text, _LOG.warning, hold))
