@@ -22,6 +22,8 @@ class Plain(enum.Enum):
     NO_HEIGHT = "no height from the vehicle's range finder"
     NO_CLIMB = "no climb rate from the vehicle"
     NO_CELLS = "how many cells the battery has is not known: set battery.cells"
+    HIGH_FLOOR = "its range finder reads more than 0.5 m on the floor"
+    OTHER_CELLS = "the vehicle tells of other cells than battery.cells"
     NO_PICTURE = "no picture from the down camera"
     AISLE_OPEN = "the aisle is not closed"
     NO_RECORD = "the flight log cannot be written"

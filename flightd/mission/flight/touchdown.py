@@ -23,7 +23,7 @@ _UNSEEN_S = 1.6
 
 _STANDS_M = 0.1
 """What the range finder reads on the floor, until it was read there."""
-_FLOOR_M = 0.5
+FLOOR_M = 0.5
 """No range finder reads more on the floor."""
 _RECKONED_M, _RECKONED_SHARE = 0.3, 0.2
 """By how much a dead-reckoned height may be wrong, and by what share of the way."""
@@ -68,7 +68,7 @@ class Standstill:
 
     def stands(self, height_m: float) -> None:
         """It stands on the floor and reads this, NaN for nothing."""
-        if height_m < _FLOOR_M:
+        if height_m < FLOOR_M:
             self._floor_m = height_m
 
     def begin(self) -> None:
@@ -89,7 +89,7 @@ class Standstill:
             self._sank_s += s.dt_s
         # near the floor or after it sank, whatever its range finder reads: elsewhere a climb rate of 0 may be
         # one that stands still
-        may_touch = s.height_m <= _FLOOR_M or self._sank_s > _TOUCHES_S
+        may_touch = s.height_m <= FLOOR_M or self._sank_s > _TOUCHES_S
         is_held = sinks and abs(climb_mps) <= _STILL_MPS and may_touch
         self._blocked_s = self._blocked_s + s.dt_s if is_held else 0.0
         still_s = self._stood_s(s, sinks=sinks)
@@ -111,7 +111,7 @@ class Standstill:
             self._climbed_m += (climb_mps - self._climbed_m / _MOVES_S) * s.dt_s
         by_height = abs(s.height_m - self._touched_m) > _MOVES_M
         by_climb = abs(climb_mps) > _MOVES_MPS or abs(self._climbed_m) > _MOVES_M
-        return by_height or by_climb or (not sinks and s.height_m > _FLOOR_M)
+        return by_height or by_climb or (not sinks and s.height_m > FLOOR_M)
 
     def _kept_s(self, s: MissionInputs, climb_mps: float, *, sinks: bool) -> float:
         """For how long the floor keeps it at its height; the climb that it tells may wander meanwhile."""

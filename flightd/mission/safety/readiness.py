@@ -6,6 +6,7 @@ import math
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
+from flightd.mission.flight.touchdown import FLOOR_M
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.reasons import (
     AwaitsBattery,
@@ -36,9 +37,11 @@ def obstacles(s: MissionInputs, config: Config, ground_silent: bool, *, arming: 
         None if v.clock_error_s <= clock_s else ClockUnsure(v.clock_error_s, clock_s),
         Unfit(found) if found else None,
         Plain.NO_HEIGHT if math.isnan(s.height_m) else None,
+        Plain.HIGH_FLOOR if not v.armed and s.height_m > FLOOR_M else None,
         Plain.NO_CLIMB if math.isnan(v.climb_mps) else None,
         ChargeUnknown(charge.doubt) if charge.doubt else None,
         Plain.NO_CELLS if v.battery_stamp_ns and math.isnan(charge.cell_v) else None,
+        Plain.OTHER_CELLS if 0 != v.battery_cells != (battery.cells or v.battery_cells) else None,
         StartChargeLow(charge.frac, p.battery_start) if charge.frac < p.battery_start else None,
         CellsLow(charge.cell_v, cell_v) if charge.cell_v < cell_v else None,
         None if s.frames_arrive else Plain.NO_PICTURE,

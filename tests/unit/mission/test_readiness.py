@@ -7,7 +7,7 @@ from dataclasses import replace
 from flightd.config.hazards import LossAction
 from flightd.core.types import HEALTHY, Attitude, LandedState, VehicleState
 from flightd.mission.guidance import ALL_WELL, MissionInputs
-from flightd.mission.reasons import in_words
+from flightd.mission.reasons import Plain, in_words
 from flightd.mission.safety.readiness import obstacles
 from tests.unit.mission.configured import configured
 
@@ -56,3 +56,20 @@ def test_late_pictures_keep_it_on_the_ground() -> None:
     (reason,) = obstacles(late, PARAMS, ground_silent=False, arming=False)
     assert reason is not None
     assert "pictures are more than 250 ms old" in in_words(reason)
+
+
+def test_a_range_finder_that_measures_from_high_up_only_keeps_it_on_the_ground() -> None:
+    """Below its minimum it reads that: a take-off would climb by a height that does not follow."""
+    high = replace(READY, height_m=0.6)
+    (reason,) = obstacles(high, PARAMS, ground_silent=False, arming=False)
+    assert reason is Plain.HIGH_FLOOR
+    assert obstacles(replace(READY, height_m=0.35), PARAMS, ground_silent=False, arming=False) == ()
+
+
+def test_cells_other_than_the_vehicle_tells_keep_it_on_the_ground() -> None:
+    """Every low voltage would be wrong."""
+    for configured_cells, told, good in ((4, 3, False), (3, 3, True), (None, 3, True), (3, 0, True)):
+        vehicle = replace(VEHICLE, battery_cells=told)
+        config = PARAMS.with_values(battery={"cells": configured_cells})
+        found = obstacles(replace(READY, vehicle=vehicle), config, ground_silent=False, arming=False)
+        assert found == (() if good else (Plain.OTHER_CELLS,))

@@ -116,6 +116,8 @@ export default {
   "no height from the vehicle's range finder": "keine Höhe vom Entfernungsmesser des Fluggeräts",
   "no climb rate from the vehicle": "keine Steigrate vom Fluggerät",
   "how many cells the battery has is not known: set battery.cells": "die Zellenzahl des Akkus ist nicht bekannt: battery.cells setzen",
+  "its range finder reads more than 0.5 m on the floor": "sein Entfernungsmesser misst am Boden über 0,5 m",
+  "the vehicle tells of other cells than battery.cells": "das Fluggerät meldet andere Zellen als battery.cells",
   "no picture from the down camera": "kein Bild von der Bodenkamera",
   "the aisle is not closed": "der Gang ist nicht geschlossen",
   "the ground station that attends this flight fell silent": "die Bodenstation, die diesen Flug beaufsichtigt, ist verstummt",
