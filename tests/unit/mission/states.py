@@ -200,10 +200,21 @@ def warned(within_s: float = 0.4, **changes: Any) -> Stimulus:
     return Stimulus(lambda flight: flight.set(warnings=replace(ALL_WELL, **changes)), within_s)
 
 
-def frozen_off_the_floor(flight: Flight) -> None:
-    """Near the pad a picture may stay the same."""
-    height_m = max(flight.inputs.height_m, 0.6)
-    flight.set(height_m=height_m, warnings=replace(ALL_WELL, frozen_s=9.0))
+def off_the_floor(**changes: Any) -> Stimulus:
+    """Near the pad a picture may stay the same, or show nothing."""
+
+    def act(flight: Flight) -> None:
+        height_m = max(flight.inputs.height_m, 0.6)
+        flight.set(height_m=height_m, warnings=replace(ALL_WELL, **changes))
+
+    return Stimulus(act)
+
+
+def _lose_lines(flight: Flight) -> None:
+    """Near the floor a take-off may."""
+    flight.set(x_age_s=9.0, y_age_s=9.0)
+    if flight.phase is Phase.TAKE_OFF:
+        flight.set(height_m=1.1)
 
 
 def sick(params: Config = PARAMS, **changes: Any) -> Stimulus:
@@ -312,7 +323,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.AISLE_OPEN: sensed(aisle_closed=False),
     Trigger.RECORD_LOST: sick(recorder_error="disk full"),
     Trigger.HAZARD_LASTS: warned(1.3, frozen_s=9.0),
-    Trigger.LINES_LOST_LONG: sensed(2.5, x_age_s=9.0, y_age_s=9.0),
+    Trigger.LINES_LOST_LONG: Stimulus(_lose_lines, 2.5),
     Trigger.NO_LINES: sensed(x_age_s=math.inf, y_age_s=math.inf, height_m=1.1),
     Trigger.CUT_OFF: placed(node="beyond the barrier"),
     Trigger.POSITION_UNKNOWN: Stimulus(_idle, 3.3),
@@ -321,8 +332,8 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.TELEMETRY_STALE: sensed(telemetry_age_s=0.2),
     Trigger.CLOCK_JUMP: sensed(dt_s=0.6),
     Trigger.CLOCK_UNSURE: sensed(clock_error_s=0.5),
-    Trigger.CAMERA_FROZEN: Stimulus(frozen_off_the_floor),
-    Trigger.CAMERA_BLIND: warned(blank_s=9.0),
+    Trigger.CAMERA_FROZEN: off_the_floor(frozen_s=9.0),
+    Trigger.CAMERA_BLIND: off_the_floor(blank_s=9.0),
     Trigger.FRAMES_STALE: warned(frame_age_s=9.0),
     Trigger.HEIGHT_WRONG: warned(height_doubted=True),
     Trigger.CORRIDOR_LEFT: warned(outside_m=1.0),
