@@ -1,4 +1,4 @@
-// What drone, station and pages report, with its figures in it.  What is not here stays English.
+// What drone, station and pages report.  What is not here stays English.
 export default {
   "{node} and {n} more": "{node} und {n} weitere",
   "camera delay": "Verzögerung der Kamera",
@@ -116,8 +116,8 @@ export default {
   "no height from the vehicle's range finder": "keine Höhe vom Entfernungsmesser des Fluggeräts",
   "no climb rate from the vehicle": "keine Steigrate vom Fluggerät",
   "how many cells the battery has is not known: set battery.cells": "die Zellenzahl des Akkus ist nicht bekannt: battery.cells setzen",
-  "its range finder reads more than 0.5 m on the floor": "sein Entfernungsmesser misst am Boden über 0,5 m",
-  "the vehicle tells of other cells than battery.cells": "das Fluggerät meldet andere Zellen als battery.cells",
+  "its range finder reads over 0.5 m on the floor": "sein Entfernungsmesser misst am Boden über 0,5 m",
+  "the vehicle tells other cells than battery.cells": "das Fluggerät meldet andere Zellen als battery.cells",
   "no picture from the down camera": "kein Bild von der Bodenkamera",
   "the aisle is not closed": "der Gang ist nicht geschlossen",
   "the ground station that attends this flight fell silent": "die Bodenstation, die diesen Flug beaufsichtigt, ist verstummt",
@@ -144,7 +144,7 @@ export default {
   "its charge stands still in flight": "seine Ladung steht im Flug still",
   "its volts do not fit its cells": "seine Spannung passt nicht zu seinen Zellen",
   "its volts are told no longer": "seine Spannung wird nicht mehr gemeldet",
-  // hazards, and what else happens to a mission
+  // hazards
   "the pilot took control": "der Pilot hat übernommen",
   "stop ordered": "Stopp befohlen",
   "down on the pad for a fresh battery": "auf dem Landeplatz für einen frischen Akku",
@@ -217,7 +217,7 @@ export default {
   "back to a pad for a fresh battery": "zurück zu einem Landeplatz für einen frischen Akku",
   "back to a pad on what is left of the battery": "mit dem Rest des Akkus zurück zu einem Landeplatz",
   "the position was corrected while landing": "die Position wurde beim Landen berichtigt",
-  // what is done about a hazard
+  // actions
   "hands off": "gibt die Steuerung ab",
   "stop": "Stopp",
   "as configured": "wie konfiguriert",
