@@ -12,6 +12,8 @@ from flightd.core.refusal import Refusal
 from flightd.core.types import HEALTHY, AttitudeSetpoint, Demand, GridPose, Health, Phase, VehicleState
 from flightd.tracking.battery_charge import Charge, told_charge
 
+FLOOR_M = 0.5
+"""No range finder reads more on the floor."""
 CEILING_MARGIN_M = 0.5
 """Nothing is flown nearer to the ceiling."""
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from flightd.config.mission import MissionConfig
 from flightd.core.types import Attitude
-from flightd.mission.guidance import MissionInputs
+from flightd.mission.guidance import FLOOR_M, MissionInputs
 
 ALIGN_M = 0.85
 AIM_S = 6.0
@@ -23,8 +23,6 @@ _UNSEEN_S = 1.6
 
 _STANDS_M = 0.1
 """What the range finder reads on the floor, until it was read there."""
-FLOOR_M = 0.5
-"""No range finder reads more on the floor."""
 _RECKONED_M, _RECKONED_SHARE = 0.3, 0.2
 """By how much a dead-reckoned height may be wrong, and by what share of the way."""
 _UNHEARD_M = 0.25

@@ -6,8 +6,7 @@ import math
 
 from flightd.config.hazards import LossAction
 from flightd.config.schema import Config
-from flightd.mission.flight.touchdown import FLOOR_M
-from flightd.mission.guidance import MissionInputs
+from flightd.mission.guidance import FLOOR_M, MissionInputs
 from flightd.mission.reasons import (
     AwaitsBattery,
     CellsLow,
