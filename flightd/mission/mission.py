@@ -92,7 +92,7 @@ class Mission:
         self._monitor = HazardMonitor(config)
         self._relocator = Relocator(config.mission, site.ceiling_m - CEILING_MARGIN_M, overhead_m)
         self._steering = ReferenceGenerator(
-            config, site.ceiling_m, self._monitor, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
+            config, site, self._monitor, self._relocator, (start.x_m, start.y_m, plan.start_yaw_rad)
         )
         self._charging = BatterySwap(site, policy, config, scanner, self._route, self._monitor)
         self._reporter = PhaseReporter(self._events, self._route, self._scan)

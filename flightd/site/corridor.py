@@ -31,6 +31,7 @@ class Corridor:
     def __init__(self, site: Site, half_width_m: float) -> None:
         self.half_width_m = half_width_m
         self._keep_outs = site.keep_outs
+        self._low_keep_outs = site.low_keep_outs
         ends = [(site.nodes[edge.a], site.nodes[edge.b]) for edge in site.edges]
         open_ends = [
             (a, b)
@@ -71,10 +72,18 @@ class Corridor:
         beside_m = self.nearest(x_m, y_m).distance_m - self.half_width_m
         return max(beside_m, NEAR_KEEP_OUT_M - self.nearest_keep_out(x_m, y_m).distance_m, 0.0)
 
-    def back(self, x_m: float, y_m: float, vx_mps: float, vy_mps: float) -> tuple[float, float] | None:
-        """Near a keep-out: the unit vector (map axes) away from it; outside: the one back to the line.  None
-        elsewhere, and when the drone comes back already."""
+    def back(
+        self, x_m: float, y_m: float, vx_mps: float, vy_mps: float, height_m: float = math.inf
+    ) -> tuple[float, float] | None:
+        """Near a keep-out, or beside one that stands below the legs as high as `height_m` (NaN: unknown): the
+        unit vector (map axes) away from it; outside: the one back to the line.  None elsewhere, and when the
+        drone comes back already."""
         area, near = self.nearest_keep_out(x_m, y_m), self.nearest(x_m, y_m)
+        for low in self._low_keep_outs:
+            beside = _nearest_of(low, x_m, y_m)
+            is_level = not height_m > low.to_m + KEEP_OUT_CLEARANCE_M
+            if is_level and 0.0 < beside.distance_m < area.distance_m:
+                area = beside
         if area.distance_m < KEEP_OUT_CLEARANCE_M and abs(area.distance_m) > 1e-6:
             bx, by = (x_m - area.x_m) / area.distance_m, (y_m - area.y_m) / area.distance_m
         elif self.half_width_m < near.distance_m < math.inf:

@@ -208,6 +208,8 @@ class Site:
     locations: Mapping[str, Location] = field(default_factory=dict)
     blocked: tuple[tuple[str, str], ...] = ()
     keep_outs: tuple[KeepOut, ...] = ()
+    low_keep_outs: tuple[KeepOut, ...] = ()
+    """Those that lie wholly below what the site is flown between: over them is no place to sink to."""
     markers: tuple[Marker, ...] = ()
     interlock: bool = False
     """Whether nothing may arm here unless an interlock says that the aisles are closed to people."""
@@ -262,10 +264,13 @@ class Site:
         return tuple(area.from_m - KEEP_OUT_CLEARANCE_M for area in self.keep_outs)
 
     def between(self, low_m: float, high_m: float) -> Site:
-        """The site as it is for a drone that stays between two heights: without the keep-outs that lie
-        wholly below or above."""
+        """The site as it is for a drone that stays between two heights: of the keep-outs that lie wholly
+        below or above, the lower ones are kept apart."""
         kept = tuple(area for area in self.keep_outs if area.from_m < high_m and area.to_m > low_m)
-        return self if kept == self.keep_outs else replace(self, keep_outs=kept)
+        if kept == self.keep_outs:
+            return self
+        below = tuple(area for area in self.keep_outs if area.to_m <= low_m)
+        return replace(self, keep_outs=kept, low_keep_outs=self.low_keep_outs + below)
 
     @cached_property
     def _neighbours(self) -> dict[str, tuple[str, ...]]:

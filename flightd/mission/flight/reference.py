@@ -16,7 +16,9 @@ from flightd.mission.guidance import Guidance, Guide, MissionInputs
 from flightd.mission.machine import State
 from flightd.mission.plan.flight_plan import Stop
 from flightd.mission.safety.hazard_monitor import HazardMonitor
+from flightd.mission.safety.low_keep_outs import LowKeepOuts
 from flightd.mission.scan.views import View
+from flightd.site.site import Site
 
 _DEMANDS = {
     Phase.PREFLIGHT: Demand.STANDBY,
@@ -63,7 +65,7 @@ class ReferenceGenerator:
     def __init__(
         self,
         config: Config,
-        ceiling_m: float,
+        site: Site,
         monitor: HazardMonitor,
         relocator: Relocator,
         start: tuple[float, float, float],
@@ -72,10 +74,12 @@ class ReferenceGenerator:
         p = config.mission
         self._params = p
         self._hazards = config.hazards
-        self._ceiling_m = ceiling_m
+        self._ceiling_m = site.ceiling_m
         self._monitor = monitor
         self._blind = monitor.blind
         self._relocator = relocator
+        self._low = LowKeepOuts(site, p)
+        self._seeks_place = False
         self._reckoned = ReckonedHeight()
         self._touchdown = Touchdown(p, self._reckoned)
         self._standstill = Standstill(p)
@@ -107,6 +111,7 @@ class ReferenceGenerator:
     def land(self, *, by_itself: bool = False) -> None:
         """A landing begins; `by_itself`: the autopilot's own."""
         self._touchdown.begin()
+        self._seeks_place = True
         self.height_goal_m = 0.0
         self._standstill.begin()
         self._still_s = 0.0
@@ -146,7 +151,7 @@ class ReferenceGenerator:
             self._height.reset(self._height.position)  # no climb by heights of the past, nor blind
             climb = 0.0
         elif task.phase is Phase.HOLD and self._blind.is_blind:
-            climb = -self._blind.sink_mps(s.height_m)
+            climb = -self._blind.sink_mps(s.height_m, self._low.floor_m(s))
             self._height.reset(s.height_m, climb)
         else:
             climb = self._climb_mps(s, task)
@@ -208,12 +213,17 @@ class ReferenceGenerator:
         self._sinks = False
         moving = self._steers and s.speed_mps > _REST_MPS and not self._standstill.touches
         settle_s = _SETTLE_UNMEASURED_S if math.isnan(s.height_m) else _SETTLE_S
-        if moving and not task.state.on_pad and task.phase_s < settle_s:
+        waits = moving and task.phase_s < settle_s
+        aside = self._steers and not self._by_itself and self._low.is_on_way(s, self.anchor)
+        if not task.state.on_pad and (waits or aside):
             self._height.reset(self._height.position)
             return 0.0, Demand.FLY
+        top_m = self._low.top_m(s)
         rate = self._touchdown.rate_mps(s, _target(s, task))
         if rate > 0.0 and not self._steers:  # what drifts unseen should not do so for long
-            rate = self._blind.rate_mps(s.believed_height_m)
+            rate = self._blind.rate_mps(s.believed_height_m - top_m)
+        elif top_m > 0.0 and not s.believed_height_m > top_m + p.expert.touch_below_m:
+            rate = min(rate, p.expert.touch_mps)
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)
         self._sinks = rate > 0.0
         deaf = s.telemetry_age_s > p.telemetry_land_s
@@ -236,6 +246,9 @@ class ReferenceGenerator:
         unknown = not (s.by_pad and phase in _BY_PAD) and (stale or not s.localised)
         if pose is None or unknown or too_low:
             return False
+        if phase is Phase.LAND and not task.state.on_pad and (self._seeks_place or not self._steers):
+            self.anchor = self._low.landing_place(s, self.anchor)
+            self._seeks_place = False
         if not self._steers:
             self._x.reset(pose.x_m, pose.vx_mps)
             self._y.reset(pose.y_m, pose.vy_mps)

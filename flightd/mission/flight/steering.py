@@ -68,9 +68,12 @@ class Steering:
         # what reads nothing is as low as it was
         low = height_m < _LOW_M or (self._lands_low and math.isnan(height_m))
         self._lands_low = low and guidance.phase is Phase.LAND
+        back = None
+        if inputs.localised:
+            back = self._plausibility.back(pose, inputs.warnings.line_m, inputs.believed_height_m)
         around = Surroundings(
             headroom_m=inputs.warnings.headroom_m,
-            back=self._plausibility.back(pose, inputs.warnings.line_m) if inputs.localised else None,
+            back=back,
             data_age_s=age_s,
             at_once=guidance.at_once,
             most_lean_rad=_LOW_LEAN_RAD if self._lands_low else math.inf,

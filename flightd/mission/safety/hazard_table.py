@@ -61,8 +61,8 @@ _FAST = "tests/sim/hazards/test_hazards.py"
 _HOLD = "brake, hold; on when it is over; land after `mission.lines_land_s`"
 _CLIMBING = "; a take-off above 0.5 m climbs no further at once, and lands after 1 s"
 _BLIND = (
-    "brake by dead reckoning and sink to `hazards.expert.blind_m` at once; up and on when it is over; land"
-    " after `hazards.expert.blind_land_s`"
+    "brake by dead reckoning and sink to `hazards.expert.blind_m` at once, to 0.3 m above a keep-out that"
+    " stands below; up and on when it is over; land after `hazards.expert.blind_land_s`"
 )
 
 HAZARDS: tuple[Hazard, ...] = (

@@ -122,13 +122,15 @@ class PlausibilityMonitor:
         """The height by which to climb: NaN while the lines contradict it."""
         return math.nan if self._doubt else reported_m
 
-    def back(self, pose: GridPose | None, line_m: tuple[float, float]) -> tuple[float, float] | None:
-        """The way back into the corridor, or away from a keep-out, (forward, right) of the body; None inside
-        it, and where the position is too uncertain to tell the side of the line, whose nearest point is
-        `line_m`."""
+    def back(
+        self, pose: GridPose | None, line_m: tuple[float, float], height_m: float = math.inf
+    ) -> tuple[float, float] | None:
+        """The way back into the corridor, or away from a keep-out that is as high as this, (forward, right)
+        of the body; None inside it, and where the position is too uncertain to tell the side of the line,
+        whose nearest point is `line_m`."""
         if pose is None or not self._tells_side(pose, line_m):
             return None
-        back = self._corridor.back(pose.x_m, pose.y_m, pose.vx_mps, pose.vy_mps)
+        back = self._corridor.back(pose.x_m, pose.y_m, pose.vx_mps, pose.vy_mps, height_m)
         if back is None:
             return None
         cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)

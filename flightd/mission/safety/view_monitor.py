@@ -14,6 +14,8 @@ from flightd.mission.guidance import MissionInputs
 
 _FLARE_PER_S, _STAND_M = 2.5, 0.10
 """A blind descent slows down towards the floor: its rate over the height of the skids."""
+_EASE_PER_S = 1.2
+"""One that has to end above something slows down so that it does not sink past its end."""
 
 
 class FloorViewMonitor:
@@ -62,6 +64,10 @@ class FloorViewMonitor:
             return p.land_mps
         return min(max(_FLARE_PER_S * (height_m - _STAND_M), p.expert.touch_blind_mps), p.expert.blind_mps)
 
-    def sink_mps(self, height_m: float) -> float:
-        """Rate at which a drone that holds blind goes down to the height from which it soon stands."""
-        return self.rate_mps(height_m) if height_m > self._hazards.blind_m else 0.0
+    def sink_mps(self, height_m: float, floor_m: float = 0.0) -> float:
+        """Rate at which a drone that holds blind goes down to the height from which it soon stands, above
+        what stands up to `floor_m` below it."""
+        if not height_m > max(self._hazards.blind_m, floor_m):
+            return 0.0
+        rate_mps = self.rate_mps(height_m)
+        return min(rate_mps, _EASE_PER_S * (height_m - floor_m)) if floor_m > 0.0 else rate_mps
