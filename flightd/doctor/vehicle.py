@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from flightd.adapters.vehicle.ardrone.configurator import COM_WATCHDOG_S
+from flightd.adapters.vehicle.ardrone.refusal import KeepsValue, NotConfigured
 from flightd.adapters.vehicle.ardrone.vehicle import ArDroneVehicle
 from flightd.adapters.vehicle.connect import signing_of
 from flightd.adapters.vehicle.mavlink.examination import Examination, ExaminationReport
@@ -27,6 +29,8 @@ _LEAST_MAX_M = 0.35
 """A take-off by a height that does not follow is ended after 0.4 m of climb."""
 _POLL_S = 0.1
 _PATIENCE_S = 8.0
+_SETTINGS_S = 30.0
+"""An AR.Drone takes one value after the other, and a change of profiles takes seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +162,7 @@ async def examine_ardrone(vehicle: ArDroneVehicle, config: Config) -> list[Check
         checks.append(error("vehicle", f"{url}: the drone is flying", "land it"))
     else:
         checks.append(ok("vehicle", f"AR.Drone answers at {url}, {state.mode}"))
+    checks.append(await _judge_settings(vehicle))
     least = config.mission.battery_start
     text = f"{state.battery_frac:.0%} charged, {least:.0%} are needed to start (mission.battery_start)"
     if state.battery_frac < least:
@@ -165,3 +170,20 @@ async def examine_ardrone(vehicle: ArDroneVehicle, config: Config) -> list[Check
     else:
         checks.append(ok("battery", text))
     return checks
+
+
+async def _judge_settings(vehicle: ArDroneVehicle) -> Check:
+    """Whether the drone took what it must not be flown without: its way down when nobody is heard is among
+    it."""
+    name = "settings"
+    for _ in range(round(_SETTINGS_S / _POLL_S)):
+        state = vehicle.state()
+        unfit = None if state is None else state.unfit
+        if state is not None and not isinstance(unfit, NotConfigured):
+            break
+        await asyncio.sleep(_POLL_S)
+    else:
+        return error(name, f"not taken within {_SETTINGS_S:g} s", "switch the drone off and on")
+    if isinstance(unfit, KeepsValue):
+        return error(name, str(unfit), "close any other app that flies it, switch it off and on")
+    return ok(name, f"taken; it lands by itself {COM_WATCHDOG_S} s after this computer falls silent")

@@ -30,7 +30,7 @@ from flightd.sim.scenario.fault_schema import (
     ProcessFault,
     StepFails,
 )
-from flightd.sim.scenario.faults import place_of
+from flightd.sim.scenario.faults import OF_ARDRONE, place_of
 from flightd.site.site import Site
 
 _ATTEND_S = 0.5
@@ -43,7 +43,8 @@ def check_faults(faults: Sequence[Fault], config: Config, site: Site, *, externa
     """InputError for a fault that this site or this vehicle's simulation cannot have."""
     for fault in faults:
         place_of(fault, site)
-        if fault.by_vehicle and (external or config.vehicle.kind == "ardrone"):
+        is_had = config.vehicle.kind != "ardrone" or fault.kind in OF_ARDRONE
+        if fault.by_vehicle and (external or not is_had):
             raise InputError(
                 f"scenario: fault {fault.kind}: only the simulated MAVLink autopilots have it;"
                 " fly --vehicle ardupilot or px4, without --truth-url"

@@ -8,6 +8,7 @@ import asyncio
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -64,6 +65,17 @@ _WITHHELD: Mapping[str, frozenset[int]] = {
 """Which messages a fault of the link keeps back."""
 _OFF_FLOOR_M = 0.3
 _HERE_M = 0.4
+
+OF_ARDRONE = frozenset({"companion_dead"})
+"""What can go wrong in a vehicle or its link that the simulated AR.Drone can have, too."""
+
+
+@runtime_checkable
+class OverRadio(Protocol):
+    """A vehicle that is reached by radio alone: without it nothing passes either way."""
+
+    radio: bool
+
 
 FaultListener = Callable[[int, bool], None]
 """Called with a fault's number and whether it begins or ends."""
@@ -188,6 +200,8 @@ class WorldFaults:
                 self._airframe.params = _slowed(self._whole, fault) if on else self._whole
             case _ if isinstance(self._vehicle, AutopilotPeer):
                 _break(self._vehicle, fault, on)
+            case LinkFault(kind="companion_dead") if isinstance(self._vehicle, OverRadio):
+                self._vehicle.radio = not on
 
     def _spoil(self, fault: CameraFault | CameraLate | CameraDisordered | CameraTurned, on: bool) -> None:
         camera = self._cameras.get("camera" if fault.camera == "down" else "front-camera")

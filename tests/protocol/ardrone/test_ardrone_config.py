@@ -275,6 +275,30 @@ def test_a_drone_is_unfit_until_it_is_configured() -> None:
     virtual(main())
 
 
+def test_a_watchdog_that_another_program_left_is_set_back() -> None:
+    async def main() -> None:
+        drone = make_drone()
+        drone.configuration.write("general:com_watchdog", "1000", None)
+        async with bench(drone) as b:
+            await b.configured()
+            assert in_force(b)["general:com_watchdog"] == "2"
+            assert b.state.unfit is None
+
+    virtual(main())
+
+
+def test_a_drone_that_would_stay_up_without_us_is_unfit_and_says_so() -> None:
+    async def main() -> None:
+        drone = make_drone()
+        drone.configuration.write("general:com_watchdog", "1000", None)
+        Ear(drone, lose=lambda command: command.text(0) == "general:com_watchdog")
+        async with bench(drone) as b:
+            await b.configured()
+            assert "keeps general:com_watchdog = 1000 instead of 2" in str(b.state.unfit)
+
+    virtual(main())
+
+
 def test_a_drone_that_keeps_another_limit_of_height_is_unfit_and_says_so() -> None:
     async def main() -> None:
         drone = make_drone()

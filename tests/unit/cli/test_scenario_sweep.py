@@ -153,12 +153,12 @@ def test_a_flight_that_cannot_be_judged_is_told_as_such(flights: Flights, sim: R
 
 
 def test_what_this_vehicle_cannot_have_is_its_rows_error(flights: Flights, sim: Run) -> None:
-    """An AR.Drone has no companion that its autopilot could miss."""
+    """Nobody can take an AR.Drone's range finder away."""
     code, out, _ = sim("--scenario", "all", "--vehicle", "ardrone", "--json")
     assert code == 1
     errors = {row["hazard"]: row["error"] for row in json.loads(out)["flights"]}
-    assert "companion_dead" in errors["companion_dead"]
-    assert errors["camera_frozen"] == ""
+    assert "height_lost" in errors["height_lost"]
+    assert errors["camera_frozen"] == errors["companion_dead"] == ""
     assert len(flights.flown) == sum(not error for error in errors.values())
 
 

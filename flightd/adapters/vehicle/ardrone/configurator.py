@@ -21,8 +21,17 @@ from flightd.runtime.within import Within
 
 _log = logging.getLogger(__name__)
 
-_SAFETY_KEYS = ("control:outdoor", "control:flying_mode", "control:control_level", "control:altitude_max")
-"""Those that bound its height and say how it takes setpoints; by its other limits setpoints are scaled."""
+_SAFETY_KEYS = (
+    "general:com_watchdog",
+    "control:outdoor",
+    "control:flying_mode",
+    "control:control_level",
+    "control:altitude_max",
+)
+"""Those that land it when this computer is silent, bound its height and say how it takes setpoints; by its
+other limits setpoints are scaled."""
+COM_WATCHDOG_S = 2
+"""Nobody heard for so long: it lands by itself.  As shipped; another program may have left more."""
 
 ACK_TIMEOUT_S = 1.0
 _REPEAT_S = 0.1
@@ -49,6 +58,7 @@ class ConfigLink(Protocol):
 def wanted_values(settings: ArDroneSettings) -> dict[str, str]:
     """Every key this program sets, in the order in which they have to be written."""
     return {
+        "general:com_watchdog": str(COM_WATCHDOG_S),
         "control:outdoor": "FALSE",  # selects a triple of limits: before the limits
         "control:flying_mode": "0",
         "control:control_level": "0",
