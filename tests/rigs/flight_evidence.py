@@ -35,7 +35,7 @@ def evidence(
     statuses: Sequence[Status],
     events: Sequence[Event] = (),
     armed: Sequence[ArmedChange] | None = None,
-    setpoints: Sequence[AttitudeSetpoint] = (),
+    setpoints: Sequence[AttitudeSetpoint] | None = None,
 ) -> FlightEvidence:
     return FlightEvidence(SITE, PLAN, statuses, events, list(truth), setpoints, armed)
 

@@ -63,7 +63,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
             if not any(since_ns <= sent.stamp_ns < until_ns for since_ns, until_ns in dead)
         ],
         armed=armed or None,
-        piloted=any(note["kind"] == "pilot" for note in begun) or bool(simulation.truth_url),
+        piloted_ns=_piloted_ns(simulation, begun),
         lost=int(flown.metadata.get("dropped", "0")) + bool(flown.damage),
     )
     figures = score(evidence)
@@ -81,6 +81,12 @@ def judge_flight(simulation: Simulation) -> Judgement:
     row = next(row for row in HAZARDS if row.name == expected.hazard)
     verdict = judged_hazard(row, expected, evidence, figures, faults, [note["stamp_ns"] for note in begun])
     return Judgement(figures, stock, sensors, verdict, verdict.faults)
+
+
+def _piloted_ns(simulation: Simulation, begun: Sequence[dict[str, Any]]) -> float:
+    """From when on there is a pilot: always one in another simulator, in ours when he takes the sticks."""
+    came_ns = (note["stamp_ns"] for note in begun if note["kind"] == "pilot")
+    return -math.inf if simulation.truth_url else min(came_ns, default=math.inf)
 
 
 def _lasted(notes: Sequence[dict[str, Any]]) -> list[tuple[float, float]]:

@@ -17,26 +17,27 @@ from flightd.site.site import Site
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """`site` as it really is; `statuses`, `events` and `setpoints` (those that went out) are the
-    daemon's, `truth` and `armed` the simulator's; all in time order.  `armed` is None where the vehicle does
-    not tell.  `piloted`: there was a pilot who could take over; where there was none a hand-over is the
-    autopilot's failsafe, and still judged.  `lost`: messages that the flight log did not take."""
+    """`site` as it really is; `statuses`, `events` and `setpoints` (those that went out; None: not known) are
+    the daemon's, `truth` and `armed` the simulator's; all in time order.  `armed` is None where the vehicle
+    does not tell.  `piloted_ns`: from when on there was a pilot who could take over, infinite where there was
+    none; a hand-over before is the autopilot's failsafe, and still judged.  `lost`: messages that the flight
+    log did not take."""
 
     site: Site
     plan: FlightPlan
     statuses: Sequence[Status]
     events: Sequence[Event]
     truth: Sequence[Kinematics]
-    setpoints: Sequence[AttitudeSetpoint] = ()
+    setpoints: Sequence[AttitudeSetpoint] | None = None
     armed: Sequence[ArmedChange] | None = None
-    piloted: bool = True
+    piloted_ns: float = -math.inf
     lost: int = 0
 
     @cached_property
     def handed_over_ns(self) -> float:
         """When the pilot took over, infinite if he did not: what comes then is his."""
         begins = (status.stamp_ns for status in self.statuses if status.phase is Phase.PILOT)
-        return next(begins, math.inf) if self.piloted else math.inf
+        return max(next(begins, math.inf), self.piloted_ns)
 
     @property
     def handed_over(self) -> bool:

@@ -88,7 +88,7 @@ def score(flight: FlightEvidence) -> FlightScore:
         ),
         min_clearance_m=_rounded(min(free, default=None)),
         max_overshoot_m=_rounded(max(0.0, float(above.max())) if len(above) else None),
-        uncontrolled_s=_rounded(longest_uncontrolled(flight)[1] if flight.setpoints else None),
+        uncontrolled_s=_rounded(longest_uncontrolled(flight)[1] if flight.setpoints is not None else None),
     )
 
 
@@ -115,13 +115,15 @@ def overshoot(flight: FlightEvidence) -> Values:
 
 def longest_uncontrolled(flight: FlightEvidence) -> tuple[float, float]:
     """When the longest time without control began, s of the clock, and how long it was, s; 0 where nothing is
-    known of setpoints."""
+    known of setpoints, which is not where none was sent."""
     motion = flight.in_air
-    sent = np.array([setpoint.stamp_ns for setpoint in flight.setpoints], np.float64) * 1e-9
-    if not len(motion) or not len(sent):
+    if flight.setpoints is None:
         return math.inf, 0.0
-    before = np.searchsorted(sent, motion.stamp_s, side="right") - 1
-    age_s = np.where(before >= 0, motion.stamp_s - sent[np.maximum(before, 0)], math.inf)
+    sent = np.array([setpoint.stamp_ns for setpoint in flight.setpoints], np.float64) * 1e-9
+    if not len(motion):
+        return math.inf, 0.0
+    before = np.searchsorted(sent, motion.stamp_s, side="right")
+    age_s = motion.stamp_s - np.r_[-math.inf, sent][before]
     alone = (age_s > _CONTROL_GAP_S) & (motion.climb_mps > _SINKING_MPS)
     longest, since = (math.inf, 0.0), math.inf
     for stamp_s, is_alone in zip(motion.stamp_s, alone, strict=True):

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.mission.safety.hazard_table import Action
-from flightd.sim.judge.clearance import clearances
+from flightd.sim.judge.clearance import BODY_RADIUS_M, clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, longest_uncontrolled, off_leg_in_air, overshoot
 from flightd.sim.judge.motion import OFF_FLOOR_M
+from flightd.site.site import Site
 
 OFF_LEG_M = 0.9
-"""Further beside its leg it is lost: the shelves of the demo site less the drone."""
+"""Further beside its leg it is lost, and nearer where shelves leave less room (`off_leg_bound_m`)."""
 OVERSHOOT_M = 0.5
 UNCONTROLLED_S = 10.0
 """An autopilot whose companion died must be landing by then."""
@@ -46,7 +47,7 @@ KINDS = {
     "hit_rack": "the body touched a shelf front, by m",
     "hit_ceiling": "the body touched the ceiling, by m",
     "hit_keep_out": "the body was in a keep-out, by m",
-    "left_leg": f"more than {OFF_LEG_M:g} m beside the leg that was meant, by m",
+    "left_leg": f"more than {OFF_LEG_M:g} m, or than shelves leave room, beside the leg that was meant, by m",
     "too_high": f"more than {OVERSHOOT_M:g} m above the commanded height, by m",
     "out_of_control": f"in the air for more than {UNCONTROLLED_S:g} s without setpoint or landing, s",
     "hard_landing": f"touched the floor faster than {_HARD_MPS:g} m/s, m/s",
@@ -111,21 +112,30 @@ def judged(
     return sorted(found, key=lambda fault: list(KINDS).index(fault.kind))
 
 
+def off_leg_bound_m(site: Site) -> float:
+    """How far beside its leg a drone may be: what the narrowest aisle's shelves leave for its body."""
+    lines_m = {node.y_m for node in site.nodes.values()}
+    rooms_m = [abs(shelf.y_m - y_m) - BODY_RADIUS_M for shelf in site.shelves for y_m in lines_m]
+    return min(OFF_LEG_M, *rooms_m) if rooms_m else OFF_LEG_M
+
+
 def _in_the_air(flight: FlightEvidence) -> Iterator[JudgedFault]:
     off = off_leg_in_air(flight)
     above = overshoot(flight)
     # a body slides into a rack on the floor, too
     free, stamps_s = clearances(flight.site, flight.motion), flight.motion.stamp_s
     air_s = flight.in_air.stamp_s
+    off_leg_m = off_leg_bound_m(flight.site)
     measured = [
         *((f"hit_{e.obstacle}", stamps_s, -e.free_m, 0.0) for e in free),
-        ("left_leg", air_s, np.where(np.isfinite(off), off, 0.0), OFF_LEG_M),
+        ("left_leg", air_s, off, off_leg_m),  # infinite where nothing was meant: off any leg
         *([("too_high", air_s, above, OVERSHOOT_M)] if len(above) else []),
     ]
     for kind, at_s, values, bound in measured:
         if (wrong := values > bound).any():
             first_s = float(at_s[int(np.argmax(wrong))]) - flight.begun_s
-            yield JudgedFault(kind, round(first_s, 2), round(float(values.max()), 3))
+            worst = float(values[np.isfinite(values)].max(initial=bound))
+            yield JudgedFault(kind, round(first_s, 2), round(worst, 3))
     since_s, alone_s = longest_uncontrolled(flight)
     if alone_s > UNCONTROLLED_S:
         yield JudgedFault("out_of_control", round(since_s - flight.begun_s, 2), round(alone_s, 2))

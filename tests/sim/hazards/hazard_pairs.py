@@ -87,6 +87,8 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     lambda draw: {"kind": "camera_disordered", "delay_s": round(draw.uniform(0.05, 0.2), 2)},
 )
 """All that a lockstep flight can have, each as strong as the table of hazards claims to bear."""
+_UNSAFE = SAFETY_KINDS | {"record_lost"}
+"""None of them takes the disk away: no record is lost either."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +141,7 @@ def fly_pair(seed: int, folder: Path, vehicle: str) -> FlownPair:
     except RunError as err:
         ended = str(err)
     judgement = judge_flight(simulation)
-    unsafe = [fault for fault in judgement.faults if fault.kind in SAFETY_KINDS]
+    unsafe = [fault for fault in judgement.faults if fault.kind in _UNSAFE]
     words = "; ".join(
         " ".join(
             f"{value}" for key, value in fault.model_dump(exclude_defaults=True).items() if key != "camera"

@@ -10,7 +10,7 @@ import pytest
 from flightd.core.types import AttitudeSetpoint, Event, EventLevel, Phase
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import score
-from flightd.sim.judge.verdict import KINDS, judged
+from flightd.sim.judge.verdict import KINDS, OFF_LEG_M, judged, off_leg_bound_m
 from flightd.sim.plant.kinematics import ArmedChange
 from flightd.site.ways import KeepOut
 from tests.rigs.flight_evidence import MS, SITE, S, at, evidence, landed, status
@@ -226,3 +226,35 @@ def test_across_the_aisle_it_is_no_farther_than_without() -> None:
 
 def test_each_kind_of_fault_says_what_it_is() -> None:
     assert all(KINDS.values())
+
+
+def test_the_narrowest_aisle_bounds_how_far_off_its_leg_a_drone_may_be() -> None:
+    near = replace(SITE, shelves=tuple(replace(s, y_m=math.copysign(0.7, s.y_m)) for s in SITE.shelves[:2]))
+    truth = [at(stamp * MS, y_m=0.5) for stamp in range(0, 1000, 100)]
+    flight = evidence(truth, [status(0)])
+    assert "left_leg" not in kinds(flight)
+    assert kinds(replace(flight, site=near))["left_leg"] == pytest.approx(0.5)
+    wide = replace(SITE, shelves=tuple(replace(s, y_m=math.copysign(9.0, s.y_m)) for s in SITE.shelves[:1]))
+    assert off_leg_bound_m(wide) == off_leg_bound_m(replace(SITE, shelves=())) == OFF_LEG_M
+
+
+def test_who_flies_where_no_leg_was_meant_is_off_it() -> None:
+    truth = [at(stamp * MS) for stamp in range(0, 2000, 100)]
+    assert "left_leg" in kinds(evidence(truth, [status(1000 * MS)])), "before the daemon said anything"
+    assert "left_leg" not in kinds(evidence(truth, [status(0)]))
+
+
+def test_a_flight_without_any_setpoint_is_out_of_control() -> None:
+    truth = [at(stamp * S) for stamp in range(20)]
+    assert kinds(evidence(truth, [status(0)], setpoints=()))["out_of_control"] == pytest.approx(19.0)
+    assert "out_of_control" not in kinds(evidence(truth, [status(0)])), "a log that does not tell of them"
+
+
+def test_a_pilot_answers_for_what_comes_after_him_not_after_a_failsafe() -> None:
+    """The autopilot takes the drone at 5 s and flies it into a rack, the pilot comes at 8 s."""
+    truth = [at(stamp * MS, y_m=1.4 if stamp > 6000 else 0.0) for stamp in range(0, 12000, 100)]
+    flight = evidence(truth, [status(0), status(5 * S, Phase.PILOT)])
+    assert "hit_rack" not in kinds(replace(flight, piloted_ns=4 * S))
+    assert "hit_rack" in kinds(replace(flight, piloted_ns=8 * S))
+    assert "hit_rack" in kinds(replace(flight, piloted_ns=math.inf))
+    assert replace(flight, piloted_ns=8 * S).handed_over_ns == 8 * S
