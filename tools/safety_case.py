@@ -1,10 +1,12 @@
 """The safety case of the guide: each hazard with its cause, how it is found and answered, and the evidence.
 
-python -m tools.safety_case SWEEP.json... [--pairs PAIRS.json...] [--add]
+python -m tools.safety_case SWEEP.json... [--pairs PAIRS.json...] [--add | --renew]
 
 The evidence is what flightd sim --scenario all --seeds N --json printed, and what python -m
 tests.sim.hazards.hazard_pairs N --json wrote; then run python -m tools.write_guide.  With --add they are told
-together with those that the page tells of already: give seeds that it has not.
+together with those that the page tells of already, where both are of the same code and vehicle, and of other
+seeds.  With --renew they take the place of those of the same hazard, and the other rows stay as old as they
+are.
 """
 
 from __future__ import annotations
@@ -24,6 +26,12 @@ from flightd.sim.scenario.scenario_files import shipped_scenarios
 EVIDENCE = FOLDER / "safety-evidence.json"
 _WORST = {"min_clearance_m": min, "off_leg_max_m": max, "max_overshoot_m": max, "down_s": max}
 _COUNTS = ("flights", "good", "safe")
+_ORIGIN = ("vehicle", "code")
+_NOT_KEPT = "not kept"
+
+
+class MixedError(ValueError):
+    """Flights that are no evidence of one thing."""
 
 
 def evidence_of(flights: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -37,6 +45,7 @@ def evidence_of(flights: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any
         row: dict[str, Any] = {
             "flights": len(flown),
             "good": sum(not (flight["faults"] or flight["error"]) for flight in flown),
+            **_origin(hazard, flown),
         }
         for key, worst in _WORST.items():
             values = [flight[key] for flight in flown if flight[key] is not None]
@@ -54,14 +63,42 @@ def evidence_of_pairs(flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "safe": sum(not flight["unsafe"] for flight in flights),
         "min_clearance_m": min(nearest, default=None),
         "max_overshoot_m": max(above, default=None),
+        **_origin("two faults", flights),
     }
 
 
-def together(told: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+def _origin(name: str, flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What the flights of one row are of, as far as they tell.  MixedError where that is not one thing."""
+    found: dict[str, Any] = {}
+    for key in _ORIGIN:
+        values = {str(flight.get(key, _NOT_KEPT)) for flight in flights}
+        if len(values) > 1:
+            raise MixedError(f"{name}: flights of different {key}: {', '.join(sorted(values))}")
+        if values - {_NOT_KEPT}:
+            found[key] = values.pop()
+    seeds = sorted(flight["seed"] for flight in flights if "seed" in flight)
+    if len(set(seeds)) < len(seeds):
+        raise MixedError(f"{name}: one seed is told twice")
+    days = [flight["flown"] for flight in flights if "flown" in flight]
+    return found | ({"seeds": seeds} if seeds else {}) | ({"flown": max(days)} if days else {})
+
+
+def together(name: str, told: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
     """The evidence of two lots of flights of one kind: numbers of flights are added, of the figures the worse
-    one stays."""
-    both: dict[str, Any] = {}
-    for key in {**told, **more}:
+    one stays.  MixedError where they are not of one code, vehicle and other seeds."""
+    if not (told.get("flights") and more.get("flights")):
+        return dict(told if told.get("flights") else more or told)
+    for key in _ORIGIN:
+        if told.get(key) is None or told.get(key) != more.get(key):
+            text = f"{key} {told.get(key, _NOT_KEPT)}, these of {more.get(key, _NOT_KEPT)}"
+            raise MixedError(f"{name}: the flights told of are of {text}; --renew tells of these alone")
+    if str(more["code"]).endswith("-dirty"):
+        raise MixedError(f"{name}: code {more['code']} is not known to be the same; commit it, or --renew")
+    if again := set(told["seeds"]) & set(more["seeds"]):
+        raise MixedError(f"{name}: told of already: seeds {_seeds_text(sorted(again))}")
+    both: dict[str, Any] = {key: told[key] for key in _ORIGIN}
+    both |= {"seeds": sorted([*told["seeds"], *more["seeds"]]), "flown": max(told["flown"], more["flown"])}
+    for key in [key for key in {**told, **more} if key not in both]:
         values = [found[key] for found in (told, more) if found.get(key) is not None]
         worst = sum if key in _COUNTS else _WORST[key]
         both[key] = worst(values) if values else None
@@ -76,20 +113,22 @@ def markdown() -> str:
     lines = [
         f"Last flown on {told['flown']}, in the {told['world']} world.",
         "",
-        "| hazard | cause | found by | action | flown | good | nearest | off its leg | too high | down in |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| hazard | cause | found by | action | flown | good | nearest | off its leg | too high | down in"
+        " | seeds | flown on | vehicle, code |",
+        f"|{13 * '---|'}",
     ]
     for row in HAZARDS:
         shown = evidence.get(row.name)
         cells = [f"`{row.name}`", _cause(paths[row.name]), row.found_by, str(row.action)]
-        cells += ["not yet", *[""] * 5] if shown is None else _cells(shown)
+        cells += ["not yet", *[""] * 8] if shown is None else [*_cells(shown), *_origin_cells(shown)]
         lines.append(f"| {' | '.join(cells)} |")
     if pairs := told.get("pairs"):
         text = (
             f"Two random faults at random moments: {pairs['flights']} flights, {pairs['safe']} safe; nearest"
             f" {pairs['min_clearance_m']:.2f} m, at most {pairs['max_overshoot_m']:.2f} m too high."
         )
-        lines += ["", text]
+        seeds, flown, code = _origin_cells(pairs)
+        lines += ["", f"{text} Seeds: {seeds}; flown on: {flown}; vehicle, code: {code}."]
     return "\n".join(lines) + "\n"
 
 
@@ -98,6 +137,24 @@ def _cells(shown: Mapping[str, Any]) -> list[str]:
         "-" if shown[key] is None else f"{shown[key]:.2f} {'s' if key == 'down_s' else 'm'}" for key in _WORST
     ]
     return [str(shown["flights"]), str(shown["good"]), *figures]
+
+
+def _origin_cells(shown: Mapping[str, Any]) -> list[str]:
+    """Which seeds, when, and what was flown."""
+    seeds = _seeds_text(shown["seeds"]) if "seeds" in shown else _NOT_KEPT
+    of = [str(shown[key]) for key in _ORIGIN if key in shown]
+    return [seeds, shown.get("flown", _NOT_KEPT), ", ".join(of) or _NOT_KEPT]
+
+
+def _seeds_text(seeds: Sequence[int]) -> str:
+    """Seeds in order, runs of them by their ends."""
+    runs: list[list[int]] = []
+    for seed in seeds:
+        if runs and seed == runs[-1][1] + 1:
+            runs[-1][1] = seed
+        else:
+            runs.append([seed, seed])
+    return ", ".join(f"{first} to {last}" if last > first else f"{first}" for first, last in runs)
 
 
 def _cause(scenario: Path) -> str:
@@ -113,27 +170,46 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("sweeps", type=Path, nargs="+")
     parser.add_argument("--pairs", type=Path, nargs="+", default=[])
     parser.add_argument("--add", action="store_true")
+    parser.add_argument("--renew", action="store_true")
     options = parser.parse_args(arguments)
     flights, pairs = _read(options.sweeps, "flights"), _read(options.pairs, "pairs")
     (world,) = {flight["world"] for flight in flights}  # one page tells of one world
+    try:
+        document = _document(parser, options, world, flights, pairs)
+    except MixedError as err:
+        parser.error(str(err))
+    EVIDENCE.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    print(f"{EVIDENCE.name}: {len(flights)} flights and {len(pairs)} with two faults")
+    return 0
+
+
+def _document(
+    parser: argparse.ArgumentParser,
+    options: argparse.Namespace,
+    world: str,
+    flights: Sequence[Mapping[str, Any]],
+    pairs: Sequence[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """What the file of the evidence holds."""
     hazards, of_pairs = evidence_of(flights), evidence_of_pairs(pairs)
-    if options.add:
+    if options.add or options.renew:
         told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
         if told["world"] != world:
             parser.error(
                 f"{EVIDENCE.name} tells of the {told['world']} world, these flights are of the {world} one"
             )
-        hazards = {
-            name: together(told["hazards"].get(name, {}), hazards.get(name, {}))
-            for name in told["hazards"] | hazards
-        }
-        of_pairs = together(told.get("pairs", {}), of_pairs)
+        before, pairs_before = told["hazards"], told.get("pairs", {})
+        if options.renew:
+            hazards = {**before, **hazards}
+            of_pairs = of_pairs if pairs else pairs_before
+        else:
+            names = before | hazards
+            hazards = {name: together(name, before.get(name, {}), hazards.get(name, {})) for name in names}
+            of_pairs = together("two faults", pairs_before, of_pairs)
     document = {"flown": f"{datetime.now(UTC):%Y-%m-%d}", "world": world, "hazards": hazards}
-    if of_pairs["flights"]:
+    if of_pairs.get("flights"):
         document["pairs"] = of_pairs
-    EVIDENCE.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-    print(f"{EVIDENCE.name}: {len(flights)} flights and {len(pairs)} with two faults")
-    return 0
+    return document
 
 
 def _read(files: Iterable[Path], key: str) -> list[Mapping[str, Any]]:

@@ -116,8 +116,9 @@ def sim(
 
 def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path, *, as_json: bool) -> None:
     """One flight, one for each seed, or one for each hazard and seed, in folders of their own."""
+    from flightd.app.simulation.flown_code import flown_code
     from flightd.app.simulation.prepare import prepare
-    from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+    from flightd.app.simulation.scenario_sweep import SHORT_ROUTE, Origin
     from flightd.app.simulation.sweep_log import SweepLog, asked_of
     from flightd.cli.scenario_sweep import fly_seeds, sweep
     from flightd.mission.safety.hazard_table import HAZARDS
@@ -132,9 +133,10 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
             return prepare(replace(options, seed=seed), conditions, folder, _say, sweep_route=SHORT_ROUTE)
 
         # what cannot be flown at all is refused here
-        prepare(options, Scenario(), out, lambda _: None, sweep_route=SHORT_ROUTE)
+        first = prepare(options, Scenario(), out, lambda _: None, sweep_route=SHORT_ROUTE)
+        origin = Origin(options.world, first.config.vehicle.kind, flown_code())
         asked = asked_of(options, len(HAZARDS) * seeds, seeds)
-        sweep(prepared, every, SweepLog(out / "sweep.jsonl", asked, _say), options.world, as_json=as_json)
+        sweep(prepared, every, SweepLog(out / "sweep.jsonl", asked, _say), origin, as_json=as_json)
         return
     conditions = load_scenarios(scenario) if scenario else Scenario()
     if seeds == 1:

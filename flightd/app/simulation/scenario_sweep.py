@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import signal
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, TypeAlias
 
 from flightd.app.simulation.judgement import judge_flight
@@ -14,6 +15,7 @@ from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.sweep_log import SweepLog, SweptRow
 from flightd.core.errors import FlightdError
 from flightd.core.snapshot import Snapshot
+from flightd.core.utc_time import utc_day
 from flightd.mission.safety.hazard_table import HAZARDS, Hazard
 from flightd.runtime.ending_signals import raised_signals
 from flightd.sim.judge.hazard_verdict import HazardVerdict
@@ -29,13 +31,22 @@ Observe: TypeAlias = Callable[[str, Simulation], AbstractContextManager[Callable
 """Gives, for the hazard that is flown now, what looks on."""
 
 
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """What the flights of a sweep are evidence of: the world, the vehicle and the code that was flown."""
+
+    world: str
+    vehicle: str
+    code: str
+
+
 def as_it_should(row: Mapping[str, Any]) -> bool:
     """Whether it went as the table of hazards says."""
     return not (row["faults"] or row["error"])
 
 
 def fly_every_hazard(
-    prepare: Prepare, observe: Observe, seeds: Sequence[int], log: SweepLog, world: str
+    prepare: Prepare, observe: Observe, seeds: Sequence[int], log: SweepLog, origin: Origin
 ) -> Iterator[SweptRow]:
     """Fly what `prepare` makes of each hazard's shipped scenario with each seed, in the table's order; those
     in `log` are told as they were.  What goes wrong with one is its row's error.  FlightInterruptedError when
@@ -52,14 +63,14 @@ def fly_every_hazard(
                 except FlightInterruptedError:
                     raise
                 except FlightdError as err:
-                    row = _row(_unjudged(hazard), str(err), scenario.needs_real_time, seed, world)
+                    row = _row(_unjudged(hazard), str(err), scenario.needs_real_time, seed, origin)
                 else:
-                    row = _flown(hazard, simulation, observe)
+                    row = _flown(hazard, simulation, observe, origin)
                 log.append(row)
             yield row
 
 
-def _flown(hazard: Hazard, simulation: Simulation, observe: Observe) -> SweptRow:
+def _flown(hazard: Hazard, simulation: Simulation, observe: Observe, origin: Origin) -> SweptRow:
     errors: list[str] = []
     for log in (simulation.flight_log, simulation.truth_log):
         log.unlink(missing_ok=True)  # a flight that does not begin is not judged by an older one's
@@ -78,16 +89,17 @@ def _flown(hazard: Hazard, simulation: Simulation, observe: Observe) -> SweptRow
         raise
     except FlightdError as err:
         errors.append(f"not judged: {err}")
-    by_clock, world = simulation.speed is not None, simulation.unknowns.kind
-    return _row(verdict or _unjudged(hazard), "; ".join(errors), by_clock, simulation.seed, world)
+    by_clock, origin = simulation.speed is not None, replace(origin, world=simulation.unknowns.kind)
+    return _row(verdict or _unjudged(hazard), "; ".join(errors), by_clock, simulation.seed, origin)
 
 
 def _interrupted(number: signal.Signals) -> FlightInterruptedError:
     return FlightInterruptedError(number, None)
 
 
-def _row(verdict: HazardVerdict, error: str, by_clock: bool, seed: int, world: str) -> SweptRow:
-    return asdict(verdict) | {"error": error, "real_time": by_clock, "seed": seed, "world": world}
+def _row(verdict: HazardVerdict, error: str, by_clock: bool, seed: int, origin: Origin) -> SweptRow:
+    told = {"error": error, "real_time": by_clock, "seed": seed, "flown": utc_day(time.time_ns()).isoformat()}
+    return asdict(verdict) | told | asdict(origin)
 
 
 def _unjudged(hazard: Hazard) -> HazardVerdict:

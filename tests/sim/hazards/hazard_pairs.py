@@ -16,9 +16,11 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from flightd.app.simulation.flown_code import flown_code
 from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.launch import fly
 from flightd.app.simulation.prepare import SimOptions, prepare
@@ -159,7 +161,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(arguments)
-    flown = []
+    flown, code = [], flown_code()
     for seed in range(options.first, options.first + options.flights):
         with tempfile.TemporaryDirectory() as made:
             folder = Path(made)
@@ -169,7 +171,8 @@ def main(arguments: Sequence[str]) -> int:
         flown.append(pair)
         print(pair, flush=True)
     if options.json is not None:
-        document = {"pairs": [pair.document() for pair in flown]}
+        origin = {"vehicle": options.vehicle, "code": code, "flown": f"{datetime.now(UTC):%Y-%m-%d}"}
+        document = {"pairs": [pair.document() | origin for pair in flown]}
         options.json.write_text(json.dumps(document, default=str) + "\n", encoding="utf-8")
     unsafe = [pair.seed for pair in flown if pair.unsafe]
     clearances = [pair.score.min_clearance_m for pair in flown if pair.score.min_clearance_m is not None]

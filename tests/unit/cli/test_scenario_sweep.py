@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from flightd.app.simulation.flown_code import flown_code
 from flightd.app.simulation.launch import FlightInterruptedError
 from flightd.app.simulation.simulation import Simulation
 from flightd.cli.main import main
@@ -88,6 +90,10 @@ def test_every_hazard_is_flown_with_every_seed_and_kept(flights: Flights, sim: R
     assert (told["wrong"], told["interrupted"]) == ([], "")
     assert told["flights"] == kept(tmp_path)
     assert (tmp_path / FIRST / "seed-5").is_dir()
+    assert {(row["vehicle"], row["code"], row["world"]) for row in told["flights"]} == {
+        ("ardupilot", flown_code(), "usual")
+    }
+    assert all(re.fullmatch(r"\d{4}-\d\d-\d\d", row["flown"]) for row in told["flights"])
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
-from tools.safety_case import evidence_of, evidence_of_pairs, together
+import pytest
+
+from tools import safety_case
+from tools.safety_case import MixedError, evidence_of, evidence_of_pairs, together
 
 
 def flight(
-    hazard: str, clear_m: float | None, down_s: float | None, *, fault: bool = False
+    hazard: str,
+    clear_m: float | None,
+    down_s: float | None,
+    *,
+    fault: bool = False,
+    seed: int = 1,
+    code: str = "aaa",
 ) -> dict[str, Any]:
     return {
         "hazard": hazard, "faults": ["near"] if fault else [], "error": "", "min_clearance_m": clear_m,
         "off_leg_max_m": 0.1, "max_overshoot_m": 0.05, "down_s": down_s,
+        "seed": seed, "code": code, "vehicle": "px4", "flown": f"2026-11-0{seed}", "world": "usual",
     }  # fmt: skip
 
 
-FIRST = [flight("wind", 0.5, 3.0), flight("wind", 0.3, None, fault=True)]
-SECOND = [flight("wind", 0.4, 5.0)]
+FIRST = [flight("wind", 0.5, 3.0), flight("wind", 0.3, None, fault=True, seed=2)]
+SECOND = [flight("wind", 0.4, 5.0, seed=3)]
 
 
 def test_two_lots_told_together_are_all_of_them_told_at_once() -> None:
-    apart = together(evidence_of(FIRST)["wind"], evidence_of(SECOND)["wind"])
+    apart = together("wind", evidence_of(FIRST)["wind"], evidence_of(SECOND)["wind"])
     assert apart == evidence_of([*FIRST, *SECOND])["wind"]
     assert (apart["flights"], apart["good"], apart["min_clearance_m"], apart["down_s"]) == (3, 2, 0.3, 5.0)
 
@@ -29,8 +41,8 @@ def test_two_lots_told_together_are_all_of_them_told_at_once() -> None:
 def test_what_was_never_told_or_never_measured_is_no_figure() -> None:
     unmeasured = evidence_of([flight("wind", None, None)])["wind"]
     assert (unmeasured["min_clearance_m"], unmeasured["down_s"]) == (None, None)
-    assert together({}, unmeasured) == together(unmeasured, {}) == unmeasured
-    assert together(unmeasured, evidence_of(SECOND)["wind"])["min_clearance_m"] == 0.4
+    assert together("wind", {}, unmeasured) == together("wind", unmeasured, {}) == unmeasured
+    assert together("wind", unmeasured, evidence_of(SECOND)["wind"])["min_clearance_m"] == 0.4
 
 
 def test_pairs_are_counted_and_the_unsafe_ones_are_not_safe() -> None:
@@ -38,4 +50,44 @@ def test_pairs_are_counted_and_the_unsafe_ones_are_not_safe() -> None:
              {"unsafe": ["near"], "min_clearance_m": 0.0, "max_overshoot_m": 0.2}]  # fmt: skip
     told = evidence_of_pairs(pairs)
     assert told == {"flights": 2, "safe": 1, "min_clearance_m": 0.0, "max_overshoot_m": 0.2}
-    assert together(told, evidence_of_pairs([]))["flights"] == 2
+    assert together("two faults", told, evidence_of_pairs([]))["flights"] == 2
+
+
+def test_flights_of_other_code_or_of_a_seed_told_of_already_are_not_summed() -> None:
+    told = evidence_of(FIRST)["wind"]
+    assert (told["seeds"], told["code"], told["vehicle"], told["flown"]) == (
+        [1, 2],
+        "aaa",
+        "px4",
+        "2026-11-02",
+    )
+    other = evidence_of([flight("wind", 0.4, 5.0, seed=3, code="bbb")])["wind"]
+    with pytest.raises(MixedError, match=r"wind: .* of code aaa, these of bbb"):
+        together("wind", told, other)
+    with pytest.raises(MixedError, match="told of already: seeds 1 to 2"):
+        together("wind", told, told)
+    with pytest.raises(MixedError, match="different code: aaa, bbb"):
+        evidence_of([*FIRST, flight("wind", 0.4, 5.0, seed=3, code="bbb")])
+    changed = evidence_of([flight("wind", 0.4, 5.0, code="aaa-dirty")])["wind"]
+    with pytest.raises(MixedError, match="not known to be the same"):
+        together("wind", changed, evidence_of([flight("wind", 0.4, 5.0, seed=2, code="aaa-dirty")])["wind"])
+
+
+def test_evidence_from_before_origins_were_kept_is_shown_and_only_renewed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    figures = {"flights": 9, "good": 9, "min_clearance_m": 0.5, "off_leg_max_m": 0.1,
+               "max_overshoot_m": 0.1, "down_s": None}  # fmt: skip
+    evidence, sweep = tmp_path / "evidence.json", tmp_path / "sweep.json"
+    kept = {"flown": "2026-10-01", "world": "usual", "hazards": {"wind": figures, "pilot": figures}}
+    evidence.write_text(json.dumps(kept))
+    sweep.write_text(json.dumps({"flights": FIRST}))
+    monkeypatch.setattr(safety_case, "EVIDENCE", evidence)
+    with pytest.raises(SystemExit):
+        safety_case.main([str(sweep), "--add"])
+    assert "vehicle not kept, these of px4" in capsys.readouterr().err
+    assert json.loads(evidence.read_text()) == kept
+    assert safety_case.main([str(sweep), "--renew"]) == 0
+    rows = {line.split(" | ")[0]: line for line in safety_case.markdown().splitlines()}
+    assert rows["| `wind`"].endswith("| 1 to 2 | 2026-11-02 | px4, aaa |")
+    assert rows["| `pilot`"].endswith("| not kept | not kept | not kept |")
