@@ -18,6 +18,7 @@ _WRAP_MS, _WRAP_NEAR_MS = 2**32, 60_000
 """Boot times count so far and begin anew; one that does so later or earlier than this was a reboot."""
 _ATTITUDES_MAX = 512
 _STAMP_AGE_MAX_NS = 500_000_000
+_AHEAD_NS = 50_000_000
 _RANGE_STALE_NS = 500_000_000
 _CLIMB_FRESH_NS = 250_000_000
 _LANDED_STALE_NS = 1_000_000_000
@@ -66,6 +67,7 @@ class NewestReadings:
         self._battery_a = math.nan
         self._battery_cells = 0
         self._battery_ns = 0
+        self._stamps_refused = 0
         self.heartbeat_ns = 0
         self.armed = False
 
@@ -107,7 +109,7 @@ class NewestReadings:
         return self._landed if now_ns - self._landed_ns <= _LANDED_STALE_NS else LandedState.UNKNOWN
 
     def _state(
-        self, now_ns: int, mode: str, *, in_control: bool, refusal: Refusal | None, stamps_refused: int = 0
+        self, now_ns: int, mode: str, *, in_control: bool, refusal: Refusal | None
     ) -> VehicleState | None:
         """Everything at one glance; None until heartbeat and attitude were heard."""
         if self._attitude is None or not self.heartbeat_ns:
@@ -125,7 +127,7 @@ class NewestReadings:
             battery_v=self._battery_v,
             heartbeat_ns=self.heartbeat_ns,
             refusal=refusal,
-            stamps_refused=stamps_refused,
+            stamps_refused=self._stamps_refused,
             battery_stamp_ns=self._battery_ns,
             battery_a=self._battery_a,
             battery_cells=self._battery_cells,
@@ -167,6 +169,11 @@ class NewestReadings:
         theirs_ns = self._sync.to_theirs(now_ns)
         wraps = 0 if theirs_ns is None else max(round((theirs_ns / _NS_PER_MS - boot_ms) / _WRAP_MS), 0)
         return (boot_ms + wraps * _WRAP_MS) * _NS_PER_MS
+
+    def _is_senseless(self, boot_ns: int, now_ns: int) -> bool:
+        """By the clocks as they were compared, a stamp long past or yet to come."""
+        ours_ns = self._sync.to_ours(boot_ns)
+        return ours_ns is not None and not -_STAMP_AGE_MAX_NS <= ours_ns - now_ns <= _AHEAD_NS
 
     def _stamp(self, boot_ns: int, now_ns: int) -> int:
         """Our time of an autopilot's stamp; the arrival while the clocks are not yet compared or when the

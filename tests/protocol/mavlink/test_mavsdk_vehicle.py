@@ -210,6 +210,40 @@ def test_attitudes_keep_their_time_when_boot_times_begin_anew_after_49_days() ->
         assert attitude.stamp_ns == pytest.approx(now_ns, abs=2 * ms)
 
 
+def test_attitudes_whose_time_makes_no_sense_are_counted_and_make_no_reboot_of_the_next() -> None:
+    """The count was always 0: a clock that jumped was never found by it."""
+    sync, ms = ClockSync(), 1_000_000
+    readings = MavsdkTelemetry(sync)
+    readings.take_mode(1, 1)
+
+    def refused(now_ms: int, boot_ms: int) -> int:
+        angles = dict.fromkeys(_ATTITUDE, 0.0) | {"time_boot_ms": boot_ms}
+        readings.take_attitude(json.dumps(angles), now_ms * ms)
+        state = readings.state(now_ms * ms, in_control=True, refusal=None)
+        assert state is not None
+        return state.stamps_refused
+
+    for now_ms in range(1_000, 3_000, 100):
+        asked = sync.ask(now_ms * ms)
+        assert sync.answered(asked, asked + 500 * ms, asked + 2 * ms)
+        assert refused(now_ms + 10, now_ms + 500) == 0
+    assert refused(3_010, 9_500) == 1, "seconds ahead"
+    assert refused(3_110, 3_600) == 1, "as before"
+    assert refused(3_210, 3_000) == 2, "long past"
+
+
+def test_the_current_of_the_battery_is_taken_where_it_is_known() -> None:
+    readings = MavsdkTelemetry(ClockSync())
+    readings.take_mode(1, 1)
+    readings.take_attitude(json.dumps(dict.fromkeys(_ATTITUDE, 0.0) | {"time_boot_ms": 7}), 1)
+    for told_a, taken_a in ((14.2, 14.2), (math.nan, math.nan), (-0.01, math.nan)):
+        battery = SimpleNamespace(id=0, voltage_v=15.0, remaining_percent=80.0, current_battery_a=told_a)
+        readings.take_battery(battery, 2)
+        state = readings.state(3, in_control=True, refusal=None)
+        assert state is not None
+        assert state.battery_a == pytest.approx(taken_a, nan_ok=True)
+
+
 def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_believed() -> None:
     rng = random.Random(11)
     odd = [math.nan, math.inf, -math.inf, 1e30, -1.0, 0.0, 0.7, 90.0, 270.0, 2**63, -(2**40), 255, 3]
@@ -228,12 +262,13 @@ def test_whatever_the_library_hands_over_nothing_raises_and_nothing_absurd_is_be
         readings.take_attitude(json.dumps(angles), now_ns)
         readings.take_range(json.dumps(ranged), now_ns)
         readings.take_velocity(SimpleNamespace(velocity=some("down_m_s")), now_ns)
-        readings.take_battery(some("id", "voltage_v", "remaining_percent"), now_ns)
+        readings.take_battery(some("id", "voltage_v", "remaining_percent", "current_battery_a"), now_ns)
         state = readings.state(now_ns, in_control=False, refusal=None)
         if state is not None:
             assert abs(state.attitude.roll_rad) < 10.0
             assert not state.height_m < 0.0
             assert not state.battery_frac > 1.0
+            assert math.isnan(state.battery_a) or 0.0 <= state.battery_a < math.inf
             assert state.attitude.stamp_ns <= now_ns
     stamps = [sample.stamp_ns for sample in readings.attitudes()]
     assert stamps == sorted(stamps)

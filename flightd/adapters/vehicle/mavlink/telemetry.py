@@ -19,8 +19,6 @@ from flightd.core.types import Attitude, LandedState, VehicleState
 
 _HEIGHTS_MAX = 64
 _NS_PER_MS = 1_000_000
-_STAMP_AGE_MAX_NS = 500_000_000
-_AHEAD_NS = 50_000_000
 _CLIMB_STALE_NS = 1_000_000_000
 _SLOPE_MS, _SLOPE_GAP_MS = 250, 500
 _SLOPE_LEAST_MS = 100
@@ -91,7 +89,6 @@ class MavlinkTelemetry(NewestReadings):
         self._climb_from = climb_from.value
         self._boot_ms = 0
         self._heights: deque[tuple[int, int]] = deque(maxlen=_HEIGHTS_MAX)
-        self._stamps_refused = 0
         self._status_ns = -2 * _STATUS_STALE_NS
         self.custom_mode: int | None = None
 
@@ -129,8 +126,7 @@ class MavlinkTelemetry(NewestReadings):
         self, now_ns: int, mode: str, *, in_control: bool, refusal: Refusal | None
     ) -> VehicleState | None:
         """Everything at one glance; None until heartbeat and attitude were heard."""
-        refused = self._stamps_refused
-        return self._state(now_ns, mode, in_control=in_control, refusal=refusal, stamps_refused=refused)
+        return self._state(now_ns, mode, in_control=in_control, refusal=refusal)
 
     def _take_attitude(self, message: Message, now_ns: int) -> bool:
         angles = (message.roll, message.pitch, message.yaw)
@@ -202,11 +198,6 @@ class MavlinkTelemetry(NewestReadings):
             volts=0.0 if millivolt == _UNKNOWN_U16 else millivolt / 1000.0,
             amperes=math.nan if message.current_battery < 0 else message.current_battery / 100.0,
         )
-
-    def _is_senseless(self, boot_ns: int, now_ns: int) -> bool:
-        """By the clocks as they were compared, a stamp long past or yet to come."""
-        ours_ns = self._sync.to_ours(boot_ns)
-        return ours_ns is not None and not -_STAMP_AGE_MAX_NS <= ours_ns - now_ns <= _AHEAD_NS
 
 
 def version_words(number: int) -> str:

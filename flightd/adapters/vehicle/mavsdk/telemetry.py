@@ -68,10 +68,14 @@ class MavsdkTelemetry(NewestReadings):
         rebooted = has_rebooted(boot_ms, self._boot_ms)
         if rebooted:
             self._sync.reset()
-        stamp_ns = self._stamp(self._boot_ns(boot_ms, now_ns), now_ns)
+        boot_ns = self._boot_ns(boot_ms, now_ns)
+        senseless = self._is_senseless(boot_ns, now_ns)
+        self._stamps_refused += rebooted or senseless
+        stamp_ns = self._stamp(boot_ns, now_ns)
         wrapped = boot_ms + REBOOT_MS < self._boot_ms
         in_order = rebooted or wrapped or boot_ms > self._boot_ms
-        self._boot_ms = boot_ms
+        if not senseless:  # one that strayed ahead would make the next good one look like a reboot
+            self._boot_ms = boot_ms
         if self._attitude is not None and not rebooted:
             in_order = in_order and stamp_ns > self._attitude.stamp_ns
         if in_order:
@@ -97,10 +101,12 @@ class MavsdkTelemetry(NewestReadings):
             self._climb_mps, self._climb_ns = -down_mps, now_ns
 
     def take_battery(self, battery: Any, now_ns: int) -> None:
-        """A Battery: volts and per cent, NaN or negative where they are not known."""
+        """A Battery: volts, amperes and per cent, NaN or negative where they are not known."""
         if battery.id == 0:
             frac, volts = battery.remaining_percent / 100.0, float(battery.voltage_v)
-            self._set_battery(now_ns, frac=frac, volts=volts, cells=self._cells)
+            told_a = float(battery.current_battery_a)
+            amperes = told_a if 0.0 <= told_a < math.inf else math.nan
+            self._set_battery(now_ns, frac=frac, volts=volts, amperes=amperes, cells=self._cells)
 
     def take_cells(self, volts_mv: Sequence[int]) -> None:
         """The voltages of a BATTERY_STATUS, mV, which the library adds up."""
