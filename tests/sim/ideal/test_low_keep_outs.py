@@ -59,7 +59,7 @@ class Crossing(IdealFlight):
         if not self._since_ns and phase is Phase.FOLLOW and over(self.airframe.kinematics(now_ns)):
             self._since_ns = now_ns
             if self._trouble.get("landed"):
-                self.commands.append(Command(now_ns, CommandKind.LAND))
+                self.commands.append(Command("1", CommandKind.LAND))
         begun = 0 < self._since_ns <= now_ns < self._since_ns + self._lasts_ns
         self.faults.frozen = begun and self._trouble.get("frozen", False)
 
