@@ -347,6 +347,7 @@ def test_an_ardrone_with_its_camera(tmp_path: Path, doctor: Doctor) -> None:
     assert by_name(document, "vehicle")["level"] == "ok", document
     assert by_name(document, "battery")["level"] == "ok"
     assert document["autopilot"] is None
+    assert "lands by itself 2 s after this computer falls silent" in by_name(document, "settings")["text"]
     assert "pictures a second" in by_name(document, "camera")["text"]
 
 
