@@ -24,8 +24,8 @@ _ENDS = {"landed": {"landed", "home"}, "down": {"landed", "home", "completed"}}
 
 @dataclass(frozen=True, slots=True)
 class HazardVerdict:
-    """One row.  `found_s` counts from the first fault (without faults: from take-off), None when the hazard
-    was not found; `down_s` from there (unfound: from the fault) to the floor, None where it asks for no
+    """One row.  `found_s` counts from the first fault (without faults, or where that was there before: from
+    take-off), None when the hazard was not found; `down_s` from there (unfound: from the fault) to the floor, None where it asks for no
     landing or never came down.  `faults` are all that was wrong with the flight, those that the scenario
     expects left out."""
 
@@ -52,8 +52,10 @@ def judged_hazard(
 ) -> HazardVerdict:
     """`faults` are the flight's own (`verdict.judged`), `begun_ns` the times at which what goes wrong
     began, in time order."""
-    from_ns = min(begun_ns, default=None) or (round(flight.begun_s * 1e9) if len(flight.in_air) else 0)
-    found_s = _found_s(row, flight.events, from_ns)
+    off_ns = round(flight.begun_s * 1e9) if len(flight.in_air) else 0
+    first_ns = min(begun_ns, default=off_ns)
+    from_ns = max(first_ns, off_ns)
+    found_s = _found_s(row, flight.events, first_ns, from_ns)
     after = [status.phase for status in flight.statuses if status.stamp_ns >= from_ns]
     down_s = _down_s(row, flight, from_ns, found_s)
     outcome = _outcome(flight, after[-1] if after else None)
@@ -91,12 +93,13 @@ def _expected(expected: Expectation) -> frozenset[str]:
     return mission | frozenset(expected.tolerates)
 
 
-def _found_s(row: Hazard, events: Sequence[Event], from_ns: int) -> float | None:
+def _found_s(row: Hazard, events: Sequence[Event], first_ns: int, from_ns: int) -> float | None:
+    """None where it was not told since `first_ns`."""
     if row.trigger is None:
         return None
     for event in events:
-        if event.name == "hazard" and event.stamp_ns >= from_ns and event.text.startswith(row.trigger.value):
-            return (event.stamp_ns - from_ns) * 1e-9
+        if event.name == "hazard" and event.stamp_ns >= first_ns and event.text.startswith(row.trigger.value):
+            return max(0.0, (event.stamp_ns - from_ns) * 1e-9)
     return None
 
 

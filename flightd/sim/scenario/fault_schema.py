@@ -1,7 +1,7 @@
 """What may be made to go wrong in a simulated flight: the `[[fault]]` entries of a scenario, typed.
 
 Each begins once: `at_s` seconds after the drone left the floor, or when it is within 0.4 m of `at_node` or
-of `at_x_m`, `at_y_m`; it lasts `duration_s`, or to the end.
+of `at_x_m`, `at_y_m`, or with `from_start` it is there from power-on; it lasts `duration_s`, or to the end.
 """
 
 from __future__ import annotations
@@ -32,14 +32,18 @@ class _Fault(Section):
     at_node: str | None = None
     at_x_m: _Finite | None = None
     at_y_m: _Finite | None = None
+    from_start: bool = False
     duration_s: float = Field(math.inf, gt=0)
 
     @model_validator(mode="after")
     def _one_beginning(self) -> Self:
         if (self.at_x_m is None) != (self.at_y_m is None):
             raise ValueError("at_x_m and at_y_m belong together: give both")
-        if sum(value is not None for value in (self.at_s, self.at_node, self.at_x_m)) != 1:
-            raise ValueError("give one of at_s, at_node, or at_x_m with at_y_m")
+        told = sum(value is not None for value in (self.at_s, self.at_node, self.at_x_m))
+        if told + self.from_start != 1:
+            raise ValueError("give one of at_s, at_node, at_x_m with at_y_m, or from_start = true")
+        if self.from_start and self.by_launcher:
+            raise ValueError("from_start is for vehicle, air and cameras: give at_s, at_node or a place")
         return self
 
 
@@ -83,7 +87,7 @@ class BareFloor(_Fault):
 
     @model_validator(mode="after")
     def _at_a_place(self) -> Self:
-        if self.at_s is not None or self.duration_s != math.inf:
+        if self.at_s is not None or self.from_start or self.duration_s != math.inf:
             raise ValueError(
                 "the floor is bare at a place for good: give at_node, or at_x_m and at_y_m alone"
             )

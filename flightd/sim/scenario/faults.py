@@ -104,15 +104,13 @@ class FaultSchedule:
 
     def step(self, now_ns: int, truth: Kinematics) -> list[tuple[int, bool]]:
         """What begins (True) and ends (False) now, by the faults' numbers."""
-        if self._off_ns is None:
-            if truth.height_m < _OFF_FLOOR_M:
-                return []
+        if self._off_ns is None and truth.height_m >= _OFF_FLOOR_M:
             self._off_ns = now_ns
         turns: list[tuple[int, bool]] = []
         for index, fault in enumerate(self._faults):
             begun_ns = self._begun_ns.get(index)
             if begun_ns is None:
-                if self._due(fault, self._places[index], (now_ns - self._off_ns) * 1e-9, truth):
+                if self._due(fault, self._places[index], now_ns, truth):
                     self._begun_ns[index] = now_ns
                     turns.append((index, True))
             elif index not in self._over and (now_ns - begun_ns) * 1e-9 >= fault.duration_s:
@@ -120,9 +118,11 @@ class FaultSchedule:
                 turns.append((index, False))
         return turns
 
-    def _due(self, fault: Fault, place: tuple[float, float] | None, up_s: float, truth: Kinematics) -> bool:
+    def _due(self, fault: Fault, place: tuple[float, float] | None, now_ns: int, truth: Kinematics) -> bool:
+        if fault.from_start or self._off_ns is None:
+            return fault.from_start
         if place is None:
-            return fault.at_s is not None and up_s >= fault.at_s
+            return fault.at_s is not None and (now_ns - self._off_ns) * 1e-9 >= fault.at_s
         dx_m, dy_m = abs(truth.x_m - place[0]), abs(truth.y_m - place[1])
         if isinstance(fault, BareFloor):
             return max(dx_m, dy_m) < fault.half_m

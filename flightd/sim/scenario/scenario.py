@@ -57,13 +57,13 @@ range_least_m = 0.05     # the range finder measures from here on; the drone sta
 
 [[fault]]                # any number of them; the kinds and their keys are in `fault_schema`
 kind = "camera_frozen"
-at_x_m = 2.2             # or at_node = "A2", or at_s = 12.0 after take-off
+at_x_m = 2.2             # or at_node = "A2", at_s = 12.0 after take-off, from_start = true
 at_y_m = 0.0
 duration_s = 3.0         # left out: to the end
 
 [expect]                 # what `--scenario all` holds the flight to
 hazard = "camera_frozen" # as in `mission.hazards`
-found_s = 0.5            # after the first fault began; without faults after take-off
+found_s = 0.5            # after the first fault began; without faults, or before it flew, after take-off
 ends = "landed"          # completed, home, landed (on a pad too), down (any of these), handed over
 tolerates = ["left_leg"] # kinds of fault that are none here (`sim.judge.verdict`)
 """
