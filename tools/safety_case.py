@@ -19,8 +19,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from flightd.app.simulation.scenario_sweep import hazard_scenarios
 from flightd.guide.pages import FOLDER
-from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.sim.scenario.scenario_files import shipped_scenarios
 
 EVIDENCE = FOLDER / "safety-evidence.json"
@@ -117,9 +117,10 @@ def markdown() -> str:
         " | seeds | flown on | vehicle, code |",
         f"|{13 * '---|'}",
     ]
-    for row in HAZARDS:
-        shown = evidence.get(row.name)
-        cells = [f"`{row.name}`", _cause(paths[row.name]), row.found_by, str(row.action)]
+    for name, row in hazard_scenarios().items():
+        shown = evidence.get(name)
+        found_by = row.found_by if name == row.name else f"as `{row.name}`"
+        cells = [f"`{name}`", _cause(paths[name]), found_by, str(row.action)]
         cells += ["not yet", *[""] * 8] if shown is None else [*_cells(shown), *_origin_cells(shown)]
         lines.append(f"| {' | '.join(cells)} |")
     if pairs := told.get("pairs"):

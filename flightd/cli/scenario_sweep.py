@@ -15,13 +15,18 @@ from rich.console import Console
 from rich.table import Table
 
 from flightd.app.simulation.launch import FlightInterruptedError, fly
-from flightd.app.simulation.scenario_sweep import Origin, Prepare, as_it_should, fly_every_hazard
+from flightd.app.simulation.scenario_sweep import (
+    Origin,
+    Prepare,
+    as_it_should,
+    fly_every_hazard,
+    hazard_scenarios,
+)
 from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.summary import Summary, write_results
 from flightd.app.simulation.sweep_log import SweepLog, SweptRow
 from flightd.cli.flight_progress import FlightProgress
 from flightd.core.errors import RunError
-from flightd.mission.safety.hazard_table import HAZARDS
 
 _T = TypeVar("_T")
 
@@ -41,7 +46,7 @@ def faults_in_words(faults: Iterable[Mapping[str, Any]]) -> str:
 def sweep(prepare: Prepare, seeds: Sequence[int], log: SweepLog, origin: Origin, *, as_json: bool) -> None:
     """Fly every hazard with each seed and print how it went, also where a signal ends it: exit code 128 and
     the signal's number.  RunError when one does not end as the table says."""
-    asked, rows = len(HAZARDS) * len(seeds), list[SweptRow]()
+    asked, rows = len(hazard_scenarios()) * len(seeds), list[SweptRow]()
     announced = _announced(len(log) + 1, asked, shown=not as_json)
     interrupted = _until_interrupted(fly_every_hazard(prepare, announced, seeds, log, origin), rows)
     wrong = [_name(row, seeds) for row in rows if not as_it_should(row)]

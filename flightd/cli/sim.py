@@ -118,10 +118,9 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
     """One flight, one for each seed, or one for each hazard and seed, in folders of their own."""
     from flightd.app.simulation.flown_code import flown_code
     from flightd.app.simulation.prepare import prepare
-    from flightd.app.simulation.scenario_sweep import SHORT_ROUTE, Origin
+    from flightd.app.simulation.scenario_sweep import SHORT_ROUTE, Origin, hazard_scenarios
     from flightd.app.simulation.sweep_log import SweepLog, asked_of
     from flightd.cli.scenario_sweep import fly_seeds, sweep
-    from flightd.mission.safety.hazard_table import HAZARDS
     from flightd.sim.scenario.scenario import Scenario
     from flightd.sim.scenario.scenario_files import load_scenarios
 
@@ -135,7 +134,7 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
         # what cannot be flown at all is refused here
         first = prepare(options, Scenario(), out, lambda _: None, sweep_route=SHORT_ROUTE)
         origin = Origin(options.world, first.config.vehicle.kind, flown_code())
-        asked = asked_of(options, len(HAZARDS) * seeds, seeds)
+        asked = asked_of(options, len(hazard_scenarios()) * seeds, seeds)
         sweep(prepared, every, SweepLog(out / "sweep.jsonl", asked, _say), origin, as_json=as_json)
         return
     conditions = load_scenarios(scenario) if scenario else Scenario()

@@ -259,6 +259,7 @@ class VehicleState:
     `climb_contradicted`: what it told of its climb was none, or ended, `climb_mps` is the height's.
     `keeps_climb`: it keeps a setpoint's climb rate by its own measurements, whatever it tells of them.
     `hovers_unsteered`: it comes to rest over the floor by itself, also where it lands by itself.
+    `in_failsafe`: it says that a failsafe of its own acts.
     `refusal` is why it does not do what is demanded, `unfit` why the adapter would not arm it, as far as can
     be asked while it stands; None where nothing is against it.
     """
@@ -285,6 +286,7 @@ class VehicleState:
     keeps_climb: bool = False
     pose_use: PoseUse = PoseUse.NONE
     hovers_unsteered: bool = False
+    in_failsafe: bool = False
 
     @property
     def may_fly(self) -> bool:

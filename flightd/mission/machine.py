@@ -204,6 +204,7 @@ _BEGINS: Mapping[Phase, Mapping[Trigger, Phase]] = {
     },
     Phase.LAND: {
         Trigger.PILOT_TOOK: Phase.PILOT,
+        Trigger.FAILSAFE_TOOK: Phase.PILOT,
         Trigger.VANISHED: Phase.ABORTED,
         Trigger.STOP: Phase.LAND,
         Trigger.TIMED_OUT: Phase.LAND,

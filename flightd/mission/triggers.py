@@ -11,6 +11,7 @@ class Trigger(enum.Enum):
     __hash__ = object.__hash__  # enum's own asks Python for the name's, a hundred times in each tick
 
     PILOT_TOOK = "the pilot took control"
+    FAILSAFE_TOOK = "the autopilot's own failsafe took control"
     STOP = "stop ordered"
     DOWN_TO_SWAP = "down on the pad for a fresh battery"
     DOWN_AS_TOLD = "down as it was told"

@@ -175,7 +175,9 @@ class World:
             self._cameras["ardrone-front-camera"] = own_front
         if spec.front is not None:
             self._cameras["front-camera"] = _front_camera(spec, spec.front, self.vehicle, clock, hold, lamp)
-        self._faults = WorldFaults(spec.faults, spec.site, self._cameras, airframe, self.vehicle, tell)
+        self._faults = WorldFaults(
+            spec.faults, spec.site, self._cameras, airframe, self.vehicle, tell, spec.seed
+        )
 
     async def open(self) -> tuple[str, int]:
         """Bind the vehicle's sockets; the address to which a daemon sends commands.  UnavailableError when

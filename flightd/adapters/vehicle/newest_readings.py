@@ -70,6 +70,7 @@ class NewestReadings:
         self._stamps_refused = 0
         self.heartbeat_ns = 0
         self.armed = False
+        self.in_failsafe = False
 
     @property
     def attitude(self) -> Attitude | None:
@@ -132,6 +133,7 @@ class NewestReadings:
             battery_a=self._battery_a,
             battery_cells=self._battery_cells,
             clock_error_s=self._sync.error_s(now_ns),
+            in_failsafe=self.in_failsafe,
         )
 
     def _set_battery(

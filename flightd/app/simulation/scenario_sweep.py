@@ -26,9 +26,16 @@ SHORT_ROUTE: Final = 'mission.nodes=["A2", "A4"]'
 """On the demo site, past the place where the shipped faults begin."""
 
 Prepare: TypeAlias = Callable[[Scenario, str, int], Simulation]
-"""Makes the flight of a scenario, a hazard's name and a seed."""
+"""Makes the flight of a scenario, its name and a seed."""
 Observe: TypeAlias = Callable[[str, Simulation], AbstractContextManager[Callable[[Snapshot], None]]]
-"""Gives, for the hazard that is flown now, what looks on."""
+"""Gives, for the scenario that is flown now, what looks on."""
+
+
+def hazard_scenarios() -> dict[str, Hazard]:
+    """The shipped scenarios by name, in the table's order: each row's own, then those that make it happen in
+    another way, which are named ROW-WAY."""
+    names = sorted(shipped_scenarios())
+    return {name: row for row in HAZARDS for name in names if name.partition("-")[0] == row.name}
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,33 +55,33 @@ def as_it_should(row: Mapping[str, Any]) -> bool:
 def fly_every_hazard(
     prepare: Prepare, observe: Observe, seeds: Sequence[int], log: SweepLog, origin: Origin
 ) -> Iterator[SweptRow]:
-    """Fly what `prepare` makes of each hazard's shipped scenario with each seed, in the table's order; those
+    """Fly what `prepare` makes of each hazard's shipped scenarios with each seed, in the table's order; those
     in `log` are told as they were.  What goes wrong with one is its row's error.  FlightInterruptedError when
     a signal ends it all."""
     paths = shipped_scenarios()
-    for hazard in HAZARDS:
-        scenario = load_scenario(paths[hazard.name])
+    for name, hazard in hazard_scenarios().items():
+        scenario = load_scenario(paths[name])
         for seed in seeds:
-            row = log.row(hazard.name, seed)
+            row = log.row(name, seed)
             if row is None:
                 try:
                     with raised_signals(_interrupted):
-                        simulation = prepare(scenario, hazard.name, seed)
+                        simulation = prepare(scenario, name, seed)
                 except FlightInterruptedError:
                     raise
                 except FlightdError as err:
-                    row = _row(_unjudged(hazard), str(err), scenario.needs_real_time, seed, origin)
+                    row = _row(name, _unjudged(hazard), str(err), scenario.needs_real_time, seed, origin)
                 else:
-                    row = _flown(hazard, simulation, observe, origin)
+                    row = _flown(name, hazard, simulation, observe, origin)
                 log.append(row)
             yield row
 
 
-def _flown(hazard: Hazard, simulation: Simulation, observe: Observe, origin: Origin) -> SweptRow:
+def _flown(name: str, hazard: Hazard, simulation: Simulation, observe: Observe, origin: Origin) -> SweptRow:
     errors: list[str] = []
     for log in (simulation.flight_log, simulation.truth_log):
         log.unlink(missing_ok=True)  # a flight that does not begin is not judged by an older one's
-    with observe(hazard.name, simulation) as observer:
+    with observe(name, simulation) as observer:
         try:
             fly(replace(simulation, observer=observer))
         except FlightInterruptedError:
@@ -90,16 +97,19 @@ def _flown(hazard: Hazard, simulation: Simulation, observe: Observe, origin: Ori
     except FlightdError as err:
         errors.append(f"not judged: {err}")
     by_clock, origin = simulation.speed is not None, replace(origin, world=simulation.unknowns.kind)
-    return _row(verdict or _unjudged(hazard), "; ".join(errors), by_clock, simulation.seed, origin)
+    told = verdict or _unjudged(hazard)
+    return _row(name, told, "; ".join(errors), by_clock, simulation.seed, origin)
 
 
 def _interrupted(number: signal.Signals) -> FlightInterruptedError:
     return FlightInterruptedError(number, None)
 
 
-def _row(verdict: HazardVerdict, error: str, by_clock: bool, seed: int, origin: Origin) -> SweptRow:
-    told = {"error": error, "real_time": by_clock, "seed": seed, "flown": utc_day(time.time_ns()).isoformat()}
-    return asdict(verdict) | told | asdict(origin)
+def _row(
+    name: str, verdict: HazardVerdict, error: str, by_clock: bool, seed: int, origin: Origin
+) -> SweptRow:
+    told = asdict(verdict) | {"hazard": name, "error": error, "real_time": by_clock, "seed": seed}
+    return told | {"flown": utc_day(time.time_ns()).isoformat()} | asdict(origin)
 
 
 def _unjudged(hazard: Hazard) -> HazardVerdict:

@@ -117,10 +117,12 @@ class HazardMonitor:
     def _authority(self, s: MissionInputs, v: VehicleState) -> set[Trigger]:
         silent_s = max(s.telemetry_age_s, (s.now_ns - v.heartbeat_ns) * 1e-9 - _HEARTBEAT_S)
         if silent_s >= self._params.telemetry_hold_s:
-            return set()
+            return set()  # silence is no pilot: a lost link is lost
         if not v.armed:
             return {Trigger.DISARMED}
-        return set() if v.in_control else {Trigger.PILOT_TOOK}  # silence is no pilot: a lost link is lost
+        if v.in_control:
+            return set()
+        return {Trigger.FAILSAFE_TOOK if v.in_failsafe else Trigger.PILOT_TOOK}
 
     def _vehicle(self, s: MissionInputs, v: VehicleState) -> _Conditions:
         p, h = self._params, self._hazards

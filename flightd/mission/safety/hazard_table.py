@@ -75,6 +75,16 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "uplink_lost",
+        Trigger.FAILSAFE_TOOK,
+        "the autopilot is in a mode that was not commanded, and its heartbeats say that a failsafe of its own"
+        " acts (`MAV_STATE_CRITICAL`): nothing that is sent reaches it",
+        Action.HANDS_OFF,
+        "silence at once, for good: it lands by itself (`companion_dead`); other failsafes of its own are"
+        " told and answered alike",
+        _FAST,
+    ),
+    Hazard(
         "stop",
         Trigger.STOP,
         "an operator's stop",

@@ -359,6 +359,9 @@ class ArduCopterPeer(AutopilotPeer):
     def _heartbeat(self) -> Message:
         base = self._base_mode() | (dialect.MAV_MODE_FLAG_GUIDED_ENABLED if self.mode in _GUIDED else 0)
         active = dialect.MAV_STATE_ACTIVE if self.armed and not self.landed else dialect.MAV_STATE_STANDBY
+        client_lost = self._client_lost and self.parameters["FS_GCS_ENABLE"]
+        if client_lost or self._low_battery_told:  # a failsafe that has acted
+            active = dialect.MAV_STATE_CRITICAL
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA, base, self.mode, active, 3
         )

@@ -82,6 +82,8 @@ class UdpLink(asyncio.DatagramProtocol):
         self.channels: dict[Address, MavlinkChannel] = {}
         self.silent = False
         """Nothing goes out any more, what comes in is heard."""
+        self.deaf = False
+        """Nothing comes in any more, what goes out is heard."""
         self.muted = False
         """A cut cable: nothing goes out, nothing comes in."""
         self.withheld: set[int] = set()
@@ -142,7 +144,7 @@ class UdpLink(asyncio.DatagramProtocol):
             self._transport.sendto(frame, address)
 
     def datagram_received(self, data: bytes, addr: Any) -> None:
-        if not self.muted:
+        if not (self.muted or self.deaf):
             self.up.carry(lambda: self._in(data, addr))
 
     def _in(self, data: bytes, addr: Any) -> None:

@@ -72,7 +72,7 @@ class Px4Peer(AutopilotPeer):
         self._thrust = 0.0
         self._setpoint_age_s = math.inf
         self._stream_s = 0.0
-        self._has_flown = False
+        self._has_flown = self._in_failsafe = False
         self._companion_ns: int | None = None
         """Its companion's clock is so far ahead of its own since boot."""
 
@@ -112,6 +112,7 @@ class Px4Peer(AutopilotPeer):
         return int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
 
     def _enter(self, mode: Px4Mode) -> None:
+        self._in_failsafe = False
         if mode != self.mode:
             self.mode = mode
             self._stick_yaw_rad = self.sensors.yaw_rad
@@ -252,6 +253,7 @@ class Px4Peer(AutopilotPeer):
         self.say(dialect.MAV_SEVERITY_CRITICAL, "Offboard control lost")
         lands = self.parameters["COM_OBL_RC_ACT"] == _OBL_LAND
         self._enter(Px4Mode.AUTO_LAND if lands else Px4Mode.ALTCTL)
+        self._in_failsafe = True
 
     # Reports
 
@@ -261,7 +263,8 @@ class Px4Peer(AutopilotPeer):
         self.instruments.landed_state = LANDED_GROUND if self.landed and self.reports_landed else landing
 
     def _heartbeat(self) -> Message:
-        active = dialect.MAV_STATE_ACTIVE if self.armed else dialect.MAV_STATE_STANDBY
+        flying = dialect.MAV_STATE_CRITICAL if self._in_failsafe else dialect.MAV_STATE_ACTIVE
+        active = flying if self.armed else dialect.MAV_STATE_STANDBY
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_PX4, self._base_mode(), self.mode, active, 3
         )

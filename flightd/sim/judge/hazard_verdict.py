@@ -25,8 +25,8 @@ _ENDS = {"landed": {"landed", "home"}, "down": {"landed", "home", "completed"}}
 @dataclass(frozen=True, slots=True)
 class HazardVerdict:
     """One row.  `found_s` counts from the first fault (without faults, or where that was there before: from
-    take-off), None when the hazard was not found; `down_s` from there (unfound: from the fault) to the floor, None where it asks for no
-    landing or never came down.  `faults` are all that was wrong with the flight, those that the scenario
+    take-off), None when the hazard was not found; `down_s` from there (unfound: from the fault) to the floor,
+    None where it asks for no landing or never came down.  `faults` are all that was wrong with the flight, those that the scenario
     expects left out."""
 
     hazard: str

@@ -96,7 +96,8 @@ class BareFloor(_Fault):
 
 class LinkFault(_Fault):
     """What the autopilot tells no longer arrives (nothing at all, no heartbeats, no answers about its clock,
-    nothing of its climb, of its battery); or nothing passes either way: the companion computer is dead."""
+    nothing of its climb, of its battery); or what is sent to it; or nothing passes either way: the companion
+    computer is dead."""
 
     by_vehicle = True
     kind: Literal[
@@ -105,6 +106,7 @@ class LinkFault(_Fault):
         "timesync_silent",
         "climb_silent",
         "battery_silent",
+        "uplink_silent",
         "companion_dead",
     ]
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
@@ -163,7 +164,9 @@ class WorldFaults:
         airframe: Airframe,
         vehicle: object,
         tell: FaultListener,
+        seed: int = 0,
     ) -> None:
+        """`seed` draws the gusts of a wind that changes."""
         self._faults = tuple(faults)
         self._schedule = FaultSchedule(faults, site)
         self._cameras = cameras
@@ -172,6 +175,7 @@ class WorldFaults:
         self._calm = airframe.wind
         self._whole = airframe.params
         self._tell = tell
+        self._draw = random.Random(f"faults {seed}")
 
     async def run(self, clock: Clock, truth_at: Callable[[int], Kinematics], recorder: Recorder) -> None:
         """Until cancelled."""
@@ -195,7 +199,7 @@ class WorldFaults:
                 self._airframe.battery_frac = fault.charge
             case WindChange():
                 wind = WindParams(fault.mean_x_mps, fault.mean_y_mps, fault.gust_mps)
-                self._airframe.wind = Wind(wind, 7) if on else self._calm
+                self._airframe.wind = Wind(wind, self._draw.getrandbits(32)) if on else self._calm
             case AttitudeSlow():
                 self._airframe.params = _slowed(self._whole, fault) if on else self._whole
             case _ if isinstance(self._vehicle, AutopilotPeer):
@@ -237,6 +241,8 @@ def _break(vehicle: AutopilotPeer, fault: Fault, on: bool) -> None:
     match fault:
         case LinkFault(kind="telemetry_silent"):
             vehicle.link.silent = on
+        case LinkFault(kind="uplink_silent"):
+            vehicle.link.deaf = on
         case LinkFault(kind="companion_dead"):
             vehicle.link.muted = on
         case LinkFault():

@@ -92,9 +92,12 @@ class Faults:
     yaw_rad: float = 0.0
     height_m: float = 0.0
     battery: float | None = None
+    cell_v: float | None = None
+    """What each of three cells has; None: the cells are not told."""
     stamps_refused: int = 0
     clock_error_s: float = 0.0
     landing_unreported: bool = False
+    in_failsafe: bool = False
     endless: bool = False
     health: Health = HEALTHY
 
@@ -155,6 +158,7 @@ class IdealFlight:
         unknown = unknowns or Unknowns()
         frame = unknown.airframe(airframe or AirframeParams())
         wash = unknown.wash(world, seed)
+        self.seed = seed
         self.airframe = Airframe(frame, wind=wind, seed=seed, x_m=x_m, y_m=y_m, wash=wash)
         self.sensors = Sensors(unknown.sensors(SensorParams()), seed)
         camera = unknown.camera(SimCamera(config.camera.lens(), config.camera.mount()))
@@ -375,10 +379,12 @@ class IdealFlight:
             armed=self._armed,
             landed=LandedState.ON_GROUND if standing else LandedState.IN_AIR,
             battery_frac=battery,
-            battery_v=12.0,
+            battery_v=12.0 if faults.cell_v is None else 3 * faults.cell_v,
+            battery_cells=0 if faults.cell_v is None else 3,
             heartbeat_ns=self._beat_ns,
             stamps_refused=faults.stamps_refused,
             clock_error_s=faults.clock_error_s,
+            in_failsafe=faults.in_failsafe,
         )
         return self._told
 

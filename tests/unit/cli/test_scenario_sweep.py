@@ -16,15 +16,16 @@ import pytest
 
 from flightd.app.simulation.flown_code import flown_code
 from flightd.app.simulation.launch import FlightInterruptedError
+from flightd.app.simulation.scenario_sweep import hazard_scenarios
 from flightd.app.simulation.simulation import Simulation
 from flightd.cli.main import main
 from flightd.core.errors import FlightdError, InputError, RunError, UnavailableError
-from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.sim.judge.hazard_verdict import HazardVerdict
 from flightd.sim.judge.verdict import JudgedFault
 
 Run = Callable[..., tuple[int, str, str]]
-FIRST, SECOND, THIRD = (row.name for row in HAZARDS[:3])
+NAMES = list(hazard_scenarios())
+FIRST, SECOND, THIRD = NAMES[:3]
 
 
 class Flights:
@@ -52,8 +53,8 @@ class Flights:
 
     @staticmethod
     def _hazard(simulation: Simulation) -> str:
-        assert simulation.scenario.expect is not None
-        return simulation.scenario.expect.hazard
+        folder = simulation.flight_log.parent
+        return (folder.parent if folder.name.startswith("seed-") else folder).name
 
 
 @pytest.fixture
@@ -85,7 +86,7 @@ def kept(folder: Path) -> list[dict[str, Any]]:
 def test_every_hazard_is_flown_with_every_seed_and_kept(flights: Flights, sim: Run, tmp_path: Path) -> None:
     code, out, _ = sim("--scenario", "all", "--seed", "4", "--seeds", "2", "--json")
     assert code == 0
-    assert flights.flown == [(row.name, seed) for row in HAZARDS for seed in (4, 5)]
+    assert flights.flown == [(name, seed) for name in NAMES for seed in (4, 5)]
     told = json.loads(out)
     assert (told["wrong"], told["interrupted"]) == ([], "")
     assert told["flights"] == kept(tmp_path)
@@ -104,7 +105,7 @@ def test_a_signal_in_flight_ends_it_all_and_the_same_command_goes_on(
     code, out, err = sim("--scenario", "all", "--json")
     assert code == 128 + number
     assert [name for name, _ in flights.flown] == [FIRST, SECOND, THIRD]
-    assert f"interrupted by {number.name} after 2 of {len(HAZARDS)} flights" in err
+    assert f"interrupted by {number.name} after 2 of {len(NAMES)} flights" in err
     told = json.loads(out)
     assert [row["hazard"] for row in told["flights"]] == [FIRST, SECOND]
     assert told["interrupted"] == number.name
@@ -114,10 +115,10 @@ def test_a_signal_in_flight_ends_it_all_and_the_same_command_goes_on(
     flights.flown.clear()
     code, out, err = sim("--scenario", "all", "--json")
     assert code == 0
-    assert [name for name, _ in flights.flown] == [row.name for row in HAZARDS[2:]]
-    assert f"goes on after 2 of {len(HAZARDS)} flights" in err
-    assert f"3 of {len(HAZARDS)}: {THIRD}" in err
-    assert [row["hazard"] for row in json.loads(out)["flights"]] == [row.name for row in HAZARDS]
+    assert [name for name, _ in flights.flown] == NAMES[2:]
+    assert f"goes on after 2 of {len(NAMES)} flights" in err
+    assert f"3 of {len(NAMES)}: {THIRD}" in err
+    assert [row["hazard"] for row in json.loads(out)["flights"]] == NAMES
 
 
 def test_a_signal_while_a_flight_is_judged_ends_it_all(flights: Flights, sim: Run, tmp_path: Path) -> None:
@@ -136,13 +137,13 @@ def test_an_error_of_one_flight_is_its_own(flights: Flights, sim: Run) -> None:
     flights.bad.add(THIRD)
     code, out, err = sim("--scenario", "all", "--seeds", "2", "--json")
     assert code == 1
-    assert len(flights.flown) == 2 * len(HAZARDS)
+    assert len(flights.flown) == 2 * len(NAMES)
     told = json.loads(out)
     assert [row["error"] for row in told["flights"][:4]] == [*map(str, errors), ""]
     wrong = [f"{name} with seed {seed}" for name in (FIRST, SECOND, THIRD) for seed in (1, 2)]
     wrong.remove(f"{SECOND} with seed 2")
     assert told["wrong"] == wrong
-    assert f"5 of {2 * len(HAZARDS)} did not go as the table says: {', '.join(wrong)}" in err
+    assert f"5 of {2 * len(NAMES)} did not go as the table says: {', '.join(wrong)}" in err
 
 
 def test_a_flight_that_cannot_be_judged_is_told_as_such(flights: Flights, sim: Run, tmp_path: Path) -> None:
@@ -180,7 +181,7 @@ def test_a_list_is_left_alone_that_other_options_began(flights: Flights, sim: Ru
     begun = (tmp_path / "sweep.jsonl").read_bytes()
     code, out, err = sim("--scenario", "all", "--world", "rough")
     assert (code, out) == (2, "")
-    assert f"holds 1 of {len(HAZARDS)} flights of another sweep (world); give another --out" in err
+    assert f"holds 1 of {len(NAMES)} flights of another sweep (world); give another --out" in err
     assert (tmp_path / "sweep.jsonl").read_bytes() == begun
 
 
@@ -193,14 +194,14 @@ def test_a_line_that_was_being_written_is_flown_again(flights: Flights, sim: Run
     flights.flown.clear()
     assert sim("--scenario", "all")[0] == 0
     assert flights.flown[0][0] == SECOND
-    assert [row["hazard"] for row in kept(tmp_path)] == [row.name for row in HAZARDS]
+    assert [row["hazard"] for row in kept(tmp_path)] == NAMES
 
 
 def test_a_sweep_that_was_flown_to_its_end_begins_anew(flights: Flights, sim: Run, tmp_path: Path) -> None:
     sim("--scenario", "all")
     assert sim("--scenario", "all", "--world", "rough")[0] == 0
-    assert len(flights.flown) == 2 * len(HAZARDS)
-    assert len(kept(tmp_path)) == len(HAZARDS)
+    assert len(flights.flown) == 2 * len(NAMES)
+    assert len(kept(tmp_path)) == len(NAMES)
 
 
 def test_a_file_that_is_no_such_list_is_refused(flights: Flights, sim: Run, tmp_path: Path) -> None:

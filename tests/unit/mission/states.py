@@ -300,6 +300,7 @@ _ONE_BATTERY = PARAMS.model_copy(update={"battery": BatteryConfig(flight_s=60.0)
 
 STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.PILOT_TOOK: sensed(in_control=False),
+    Trigger.FAILSAFE_TOOK: sensed(in_control=False, in_failsafe=True),
     Trigger.STOP: ordered(CommandKind.STOP),
     Trigger.DOWN_TO_SWAP: sensed(armed=False),
     Trigger.DOWN_AS_TOLD: sensed(armed=False),

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from flightd.app.simulation.process_faults import check_faults
+from flightd.app.simulation.scenario_sweep import hazard_scenarios
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
 from flightd.mission.safety.hazard_table import HAZARDS
@@ -33,10 +34,12 @@ def written(folder: Path, text: str, name: str = "s.toml") -> Path:
 
 def test_every_hazard_has_a_shipped_scenario_and_every_shipped_scenario_names_a_hazard() -> None:
     shipped = {name: load_scenario(path) for name, path in shipped_scenarios().items()}
-    assert set(shipped) == {row.name for row in HAZARDS}
+    assert {row.name for row in HAZARDS} <= set(shipped)
+    rows = hazard_scenarios()
+    assert set(shipped) == set(rows)
     for name, scenario in shipped.items():
         assert scenario.expect is not None
-        assert scenario.expect.hazard == name
+        assert scenario.expect.hazard == rows[name].name
         FaultSchedule(scenario.fault, SITE)  # its places are on the demo site
 
 
@@ -45,10 +48,16 @@ def test_every_hazard_has_a_shipped_scenario_and_every_shipped_scenario_names_a_
     [
         ('[[fault]]\nkind = "gremlin"\nat_s = 1\n', r"s\.toml: fault\.0: .*'camera_frozen'"),
         ('[[fault]]\nkind = "camera_frozen"\nat_s = 1\nvolume = 3\n', r"fault\.0\.camera_frozen\.volume"),
-        ('[[fault]]\nkind = "camera_frozen"\n', "give one of at_s, at_node, or at_x_m with at_y_m"),
+        (
+            '[[fault]]\nkind = "camera_frozen"\n',
+            "give one of at_s, .*, or from_start",
+        ),
         ('[[fault]]\nkind = "camera_frozen"\nat_s = 1\nat_node = "A2"\n', "give one of"),
         ('[[fault]]\nkind = "camera_frozen"\nat_x_m = 1\n', "belong together"),
+        ('[[fault]]\nkind = "camera_frozen"\nat_s = 1\nfrom_start = true\n', "give one of"),
+        ('[[fault]]\nkind = "step_fails"\nfrom_start = true\n', "for vehicle, air and cameras"),
         ('[[fault]]\nkind = "bare_floor"\nat_s = 1\n', "at a place for good"),
+        ('[[fault]]\nkind = "bare_floor"\nfrom_start = true\n', "at a place for good"),
         ('[[fault]]\nkind = "battery"\nat_s = 1\ncharge = 1.5\n', r"fault\.0\.battery\.charge"),
         ("fault = 3\n", "fault"),
         ("[vehicle]\nswap_s = 9.0\ncontact_s = 90.0\n", r"s\.toml: vehicle: .*leave one out"),
@@ -87,6 +96,14 @@ def test_a_fault_begins_so_long_after_take_off_and_ends() -> None:
         height_m = 0.1 if tenth < 30 else 1.6
         turns += [(tenth, *turn) for turn in schedule.step(now_ns, replace(FLOOR, height_m=height_m))]
     assert turns == [(50, 0, True), (60, 0, False)]
+
+
+def test_a_fault_from_the_start_is_there_while_it_stands_and_others_are_not() -> None:
+    there = CameraFault(kind="camera_black", from_start=True, duration_s=2.0)
+    schedule = FaultSchedule([there, CameraFault(kind="camera_gone", at_s=0.0)], SITE)
+    assert schedule.step(0, FLOOR) == [(0, True)]
+    assert schedule.step(1_000_000_000, FLOOR) == []
+    assert schedule.step(2_000_000_000, replace(FLOOR, height_m=0.3)) == [(0, False), (1, True)]
 
 
 def test_a_fault_begins_at_its_place_and_nowhere_else() -> None:

@@ -28,6 +28,8 @@ _LEAP_MPS = 6.0
 """No vehicle of ours climbs or sinks so fast: the height's origin was moved (at arming, say)."""
 _NO_CELL_MV = 65535
 _STATUS_STALE_NS = 5_000_000_000
+_FAILSAFE = frozenset({dialect.MAV_STATE_CRITICAL, dialect.MAV_STATE_EMERGENCY})
+"""HEARTBEAT.system_status of a vehicle that a failsafe of its own flies: ArduPilot and PX4 say CRITICAL."""
 _UNKNOWN_U16 = 65535
 _UNKNOWN_QUALITY, _NO_SIGNAL = 0, 1
 
@@ -99,6 +101,7 @@ class MavlinkTelemetry(NewestReadings):
                 self.heartbeat_ns = now_ns
                 self.custom_mode = int(message.custom_mode)
                 self.armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+                self.in_failsafe = message.system_status in _FAILSAFE
             case "ATTITUDE":
                 return self._take_attitude(message, now_ns)
             case "DISTANCE_SENSOR":

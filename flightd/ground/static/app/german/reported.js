@@ -146,6 +146,7 @@ export default {
   "its volts are told no longer": "seine Spannung wird nicht mehr gemeldet",
   // hazards
   "the pilot took control": "der Pilot hat übernommen",
+  "the autopilot's own failsafe took control": "eine Sicherung des Autopiloten hat übernommen",
   "stop ordered": "Stopp befohlen",
   "down on the pad for a fresh battery": "auf dem Landeplatz für einen frischen Akku",
   "nothing was counted": "nichts wurde gezählt",
