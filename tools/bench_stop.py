@@ -1,7 +1,11 @@
-"""How long an emergency stop takes from the client's call to the setpoint on the wire.
+"""How long an emergency stop takes from the client's call to the setpoint on the wire, how far apart the
+setpoints are, and how late the loop is: undisturbed, and while workers are stopped, killed and answer with
+8 MB, as ratios to the undisturbed share of the same process.
 
 A client on real loopback sockets, the ground link, the pilot's own tick at 50 Hz amid a leg, limits, pump
-and a UDP socket with a listener.  Each stop is taken by a fresh copy of the same flying pilot.
+and a UDP socket with a listener.  Each stop is taken by a fresh copy of the same flying pilot.  Detectors and
+label readers are processes of the daemon's own pools; the troubles take turns, so that each meets the
+machine's other load.
 
 python -m tools.bench_stop [--stops N]
 """
@@ -33,10 +37,14 @@ from flightd.runtime.clock import LoopClock
 from flightd.runtime.within import Within
 from flightd.site.site_file import load_site
 from tests.sim.ideal.ideal_flight import IdealFlight
+from tools.worker_trouble import BusyWorkers, Trouble
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 TICK_S = 0.02
-WARM_S = 0.06
+WARM_S = 0.3
+PROBE_S = 0.01
+TURN = 10
+"""So many stops with each trouble before the next one has its turn."""
 
 
 class ShiftedClock:
@@ -116,47 +124,105 @@ def _flying() -> tuple[Pilot, int, VehicleState]:
     return flight.pilot, last[0].now_ns, vehicle
 
 
+class Measured:
+    """What was measured with one trouble."""
+
+    def __init__(self, peer: UdpVehicle, clock: ShiftedClock) -> None:
+        self.pump = SetpointPump(peer, clock, lambda *_: None)
+        self.taken_ms: list[float] = []
+        self.late_ms: list[float] = []
+
+    async def probe(self) -> None:
+        """How late a timer of the loop is, every 10 ms."""
+        loop = asyncio.get_running_loop()
+        while True:
+            due_s = loop.time() + PROBE_S
+            await asyncio.sleep(PROBE_S)
+            self.late_ms.append((loop.time() - due_s) * 1e3)
+
+    def figures(self) -> dict[str, dict[str, float]]:
+        return {
+            "order_to_wire_ms": _quantiles(self.taken_ms),
+            "setpoint_interval_ms": self.pump.interval_quantiles_ms(),
+            "loop_late_ms": _quantiles(self.late_ms),
+        }
+
+
+def _quantiles(values: list[float]) -> dict[str, float]:
+    cuts = statistics.quantiles(values, n=100, method="inclusive")
+    return {"p50": round(cuts[49], 2), "p99": round(cuts[98], 2), "max": round(max(values), 2)}
+
+
 async def _measure(stops: int) -> dict[str, Any]:
-    pilot, flown_ns, vehicle = _flying()
+    flown = _flying()
     loop = asyncio.get_running_loop()
     transport, listener = await loop.create_datagram_endpoint(Listener, local_addr=("127.0.0.1", 0))
     clock, peer = ShiftedClock(), UdpVehicle(transport.get_extra_info("sockname"))
     config = GroundConfig(listen="127.0.0.1", status_port=0, command_port=0)
     site = load_site(CONFIGS / "site-demo.toml")
-    taken_ms = []
+    measured = {trouble: Measured(peer, clock) for trouble in Trouble}
+    workers = BusyWorkers()
     with ZmqGround(config, site, LoopClock()) as link:
         status_port, command_port = (int(endpoint.rpartition(":")[2]) for endpoint in link.endpoints)
-        pump = SetpointPump(peer, clock, lambda *_: None)
         async with (
+            workers.open(),
             GroundClient(Address("127.0.0.1", status_port, command_port), timeout_s=10.0) as client,
             asyncio.TaskGroup() as tasks,
         ):
-            services = [tasks.create_task(link.run()), tasks.create_task(pump.run())]
-            for _ in range(stops):
-                pump.set(None)
-                flying = copy.deepcopy(pilot)
-                clock.set(flown_ns)
-                listener.stopped = loop.create_future()
-                ticking = tasks.create_task(_tick(flying, vehicle, link, pump, clock))
-                await asyncio.sleep(WARM_S + TICK_S * random.random())
-                asked_s = loop.time()
-                await client.order(CommandKind.STOP, order_id=os.urandom(8).hex())
-                async with Within(5.0):
-                    taken_ms.append((await listener.stopped - asked_s) * 1e3)
-                ticking.cancel()
-            for service in services:
-                service.cancel()
+            serving = tasks.create_task(link.run())
+            for first in range(0, stops, TURN):
+                for trouble, into in measured.items():
+                    async with workers.asked(trouble):
+                        for _ in range(min(TURN, stops - first)):
+                            await _one_stop(into, flown, clock, link, client, listener)
+            serving.cancel()
     transport.close()
-    cuts = statistics.quantiles(taken_ms, n=100)
+    told = {trouble.value: into.figures() for trouble, into in measured.items()}
     return {
         "stops": stops,
-        "order_to_wire_ms": {
-            "p50": round(cuts[49], 2),
-            "p99": round(cuts[98], 2),
-            "max": round(max(taken_ms), 2),
-        },
+        **told,
+        "ratios": {name: _ratios(each, told[Trouble.NONE]) for name, each in told.items()},
+        "workers": dict(sorted(workers.counts.items())),
         "load": os.getloadavg()[0],
     }
+
+
+def _ratios(
+    figures: dict[str, dict[str, float]], undisturbed: dict[str, dict[str, float]]
+) -> dict[str, dict[str, float]]:
+    return {
+        figure: {share: round(value / undisturbed[figure][share], 2) for share, value in values.items()}
+        for figure, values in figures.items()
+    }
+
+
+async def _one_stop(
+    into: Measured,
+    flown: tuple[Pilot, int, VehicleState],
+    clock: ShiftedClock,
+    link: ZmqGround,
+    client: GroundClient,
+    listener: Listener,
+) -> None:
+    pilot, flown_ns, vehicle = flown
+    loop = asyncio.get_running_loop()
+    into.pump.set(None)
+    flying = copy.deepcopy(pilot)
+    clock.set(flown_ns)
+    listener.stopped = loop.create_future()
+    async with asyncio.TaskGroup() as tasks:
+        running = [
+            tasks.create_task(_tick(flying, vehicle, link, into.pump, clock)),
+            tasks.create_task(into.pump.run()),
+            tasks.create_task(into.probe()),
+        ]
+        await asyncio.sleep(WARM_S + TICK_S * random.random())
+        asked_s = loop.time()
+        await client.order(CommandKind.STOP, order_id=os.urandom(8).hex())
+        async with Within(5.0):
+            into.taken_ms.append((await listener.stopped - asked_s) * 1e3)
+        for task in running:
+            task.cancel()
 
 
 async def _tick(
