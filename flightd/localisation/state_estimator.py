@@ -283,10 +283,13 @@ class StateEstimator:
         # without a range finder the lines alone contradict the climb: such a drone lands anyhow
         alone = math.isnan(measured_m)
         told_m = by_width_m if alone else measured_m
+        width_m = by_width_m if used else None
+        if width_m is None and self.climb.found and not alone:
+            width_m = measured_m  # near the floor no line is wide enough: what both have told goes on
         if told_m is not None and told_m < _CLIMB_DOUBT_M and not self.climb.found:
             self.climb.forget()
-        elif used and told_m is not None and by_width_m is not None and math.isfinite(climbed_m):
-            self.climb.step(exposed_ns, told_m, by_width_m, climbed_m, alone=alone)
+        elif told_m is not None and width_m is not None and math.isfinite(climbed_m):
+            self.climb.step(exposed_ns, told_m, width_m, climbed_m, alone=alone)
             if self.climb.found:
                 carried.forget()
 

@@ -77,7 +77,8 @@ class Standstill:
 
     def step(self, s: MissionInputs, *, sinks: bool) -> float:
         """Seconds; 0 while it moves, is higher, or is not heard.  `sinks`: it is commanded to."""
-        climb_mps = math.nan if s.vehicle is None else s.vehicle.climb_mps
+        told_mps = math.nan if s.vehicle is None else s.vehicle.climb_mps
+        climb_mps = told_mps - s.warnings.climb_error_mps
         self._doubted |= s.warnings.height_doubted
         if s.warnings.height_stuck or self._doubted:
             s = replace(s, height_m=math.nan)  # what is wrong may be what is read on the floor
@@ -90,7 +91,7 @@ class Standstill:
         may_touch = s.height_m <= FLOOR_M or self._sank_s > _TOUCHES_S
         is_held = sinks and abs(climb_mps) <= _STILL_MPS and may_touch
         self._blocked_s = self._blocked_s + s.dt_s if is_held else 0.0
-        still_s = self._stood_s(s, sinks=sinks)
+        still_s = self._stood_s(s, climb_mps, sinks=sinks)
         stands = max(still_s, self._blocked_s) > _TOUCHES_S
         is_kept = self._kept_s(s, climb_mps, sinks=sinks) > _KEPT_S
         if self._defies(s, sinks=sinks) or is_kept or stands:
@@ -134,9 +135,9 @@ class Standstill:
             return False
         return (told.stamp_ns - before.stamp_ns) * 1e-9 > _DEFIES_S  # a sample that is repeated tells nothing
 
-    def _stood_s(self, s: MissionInputs, *, sinks: bool) -> float:
+    def _stood_s(self, s: MissionInputs, climb_mps: float, *, sinks: bool) -> float:
         v = s.vehicle
-        if v is None or s.telemetry_age_s > self._hold_s or not _is_steady(s.height_m, v.climb_mps):
+        if v is None or s.telemetry_age_s > self._hold_s or not _is_steady(s.height_m, climb_mps):
             self._since = None
             return 0.0
         high = s.height_m > self._floor_m + _NEAR_FLOOR_M

@@ -105,6 +105,15 @@ def test_a_range_finder_that_sticks_at_the_floor_makes_no_hover_a_standstill() -
     assert stands.touches
 
 
+def test_what_stands_and_tells_a_climb_that_is_known_to_be_wrong_stands() -> None:
+    stands = Standstill(PARAMS)
+    misled = Warnings(climb_wrong=True, climb_error_mps=-0.8)
+    for tick in range(60):
+        still_s = stands.step(replace(told(tick, 0.1, -0.8), warnings=misled), sinks=True)
+    assert stands.touches
+    assert still_s > 1.0
+
+
 @pytest.mark.parametrize(("rises_mps", "height_m"), [(0.5, 0.1), (0.2, 0.1), (0.5, float("nan"))])
 def test_one_that_rises_flies(rises_mps: float, height_m: float) -> None:
     stands = Standstill(PARAMS)
