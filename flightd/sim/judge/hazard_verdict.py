@@ -26,8 +26,8 @@ _ENDS = {"landed": {"landed", "home"}, "down": {"landed", "home", "completed"}}
 class HazardVerdict:
     """One row.  `found_s` counts from the first fault (without faults, or where that was there before: from
     take-off), None when the hazard was not found; `down_s` from there (unfound: from the fault) to the floor,
-    None where it asks for no landing or never came down.  `faults` are all that was wrong with the flight, those that the scenario
-    expects left out."""
+    None where row or scenario ask for no landing or it never came down.  `faults` are all that was wrong with
+    the flight, those that the scenario expects left out."""
 
     hazard: str
     found_s: float | None
@@ -57,7 +57,8 @@ def judged_hazard(
     from_ns = max(first_ns, off_ns)
     found_s = _found_s(row, flight.events, first_ns, from_ns)
     after = [status.phase for status in flight.statuses if status.stamp_ns >= from_ns]
-    down_s = _down_s(row, flight, from_ns, found_s)
+    lands = expected.ends != "completed" or row.shows_landing
+    down_s = _down_s(row, flight, from_ns, found_s) if lands else None
     outcome = _outcome(flight, after[-1] if after else None)
     at_s = _finite(from_ns * 1e-9 - flight.begun_s)
     own = [fault for fault in faults if fault.kind not in _expected(expected)]

@@ -94,6 +94,8 @@ def test_an_autopilot_whose_barometer_is_misled_is_kept_at_its_height_and_landed
             left_ns.append(now_ns)
         on = left_ns and (now_ns - left_ns[0]) * 1e-9 < lasts_s
         flight.sensors.fault.climb_drift_mps = error_mps if on else 0.0
+        flight.faults.bare = bool(left_ns) and flight.airframe.height_m < 0.3  # no line is wide enough there
+        flight.faults.landing_unreported = bool(on)  # by what it believes to climb it does not stand
 
     flight.on_tick = drift
     flown = flight.fly(60.0)
