@@ -106,7 +106,7 @@ def test_the_scenario_that_is_printed_names_every_key_with_its_default() -> None
 def test_every_kind_of_fault_has_a_row_with_its_keys() -> None:
     rows = [line for line in page("simulation").text.splitlines() if line.startswith("| `")]
     for kind in get_args(get_args(Fault)[0]):
-        common = {"at_s", "at_node", "at_x_m", "at_y_m", "duration_s", "kind"}
+        common = {"at_s", "at_node", "at_x_m", "at_y_m", "from_start", "duration_s", "kind"}
         keys = set(kind.model_fields) - common
         for name in get_args(kind.model_fields["kind"].annotation):
             row = next(row for row in rows if f"`{name}`" in row.split("|")[1])
