@@ -3,6 +3,7 @@
 python tools/make_dataset.py out/hard --level hard --count 200 --seed 9000
 python tools/make_dataset.py out/small --level perturbed --size 640x360 --colour white
 python tools/make_dataset.py out/empty --level hard --layout negative
+python tools/make_dataset.py out/rough --level rough --count 60    # the floor of the simulator's rough world
 """
 
 from __future__ import annotations
@@ -13,10 +14,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from flightd.sim.dataset.generate import write_dataset
+from flightd.sim.dataset.generate import LEVEL_NAMES, ROUGH, write_dataset
 from flightd.sim.dataset.paint import PAINT_HSV
 from flightd.sim.dataset.scenes import LAYOUTS
-from flightd.sim.dataset.severity import LEVELS
 
 
 def size(text: str) -> tuple[int, int]:
@@ -31,7 +31,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--level", choices=list(LEVELS), default="perturbed")
+    parser.add_argument("--level", choices=LEVEL_NAMES, default="perturbed")
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0, help="seed of the first frame; the others follow")
     parser.add_argument("--size", type=size, default=(1920, 1080), help="WIDTHxHEIGHT (1920x1080)")
@@ -41,6 +41,8 @@ def main() -> None:
     parser.add_argument("--layout", choices=LAYOUTS, help="arrangement (default: drawn by seed)")
     parser.add_argument("--masks", action="store_true", help="write each frame's paint mask (for training)")
     wanted = parser.parse_args()
+    if wanted.level == ROUGH and (wanted.layout or wanted.masks):
+        parser.error(f"--level {ROUGH} has no --layout and no --masks; leave them out, or choose another level")
     width_px, height_px = wanted.size
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal) as progress:

@@ -1,1 +1,1 @@
-"""Labelled frames with exact truth at three levels of difficulty."""
+"""Labelled frames with exact truth at four levels of difficulty."""

@@ -1,9 +1,10 @@
-"""Labelled frames with exact truth at three levels of difficulty, from a seed.
+"""Labelled frames with exact truth at four levels of difficulty, from a seed.
 
 `clean` is a plain floor and a good sensor; `perturbed` is an ordinary day: uneven light, a soft shadow,
 texture, joints, light wear, blur, noise and JPEG; `hard` piles up deep shadows, glare, worn and broken
 paint, occluders, tyre marks, distractors in the paint's colour, motion blur, darkness, residual lens
-distortion and perspective taper.  The same (level, seed, size) always gives the same frame.
+distortion and perspective taper; `rough` is the floor that the simulator's rough world is flown over, drawn
+by its own renderer (`rough_floor`).  The same (level, seed, size) always gives the same frame.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from flightd.core.errors import InputError
 from flightd.core.types import Image
 from flightd.sim.dataset import disturbances as disturb
 from flightd.sim.dataset.paint import Bend, break_band, coverage, floor_bgr, floor_texture, paint_bgr, wear
+from flightd.sim.dataset.rough_floor import rough_frame
 from flightd.sim.dataset.scenes import (
     Layout,
     Scene,
@@ -39,6 +42,8 @@ from flightd.vision.training.labelled_frames import (
     write_labels,
 )
 
+ROUGH = "rough"
+LEVEL_NAMES = (*LEVELS, ROUGH)
 COLOURS = ("yellow", "white", "red", "blue", "green", "black")
 
 
@@ -120,6 +125,21 @@ def generate(
     return LabelledFrame(bgr, label, (worn * 255.0 + 0.5).astype(np.uint8), unsure)
 
 
+def frame_of_any_level(
+    level: str,
+    seed: int,
+    width: int = 1920,
+    height: int = 1080,
+    colour: str | None = None,
+    layout: Layout | None = None,
+) -> tuple[Image, LabelledImage]:
+    """As `generate`, for each of LEVEL_NAMES; a rough floor has no `layout`."""
+    if level == ROUGH:
+        return rough_frame(seed, width, height, colour)
+    frame = generate(level, seed, width, height, colour, layout)
+    return frame.bgr, frame.label
+
+
 def _bent(line: LabelledLine, scene: Scene, bend: Bend) -> LabelledLine:
     """The straight line nearest to a line seen through `bend` (least squares over its visible span)."""
     if not bend.k:
@@ -155,18 +175,23 @@ def write_dataset(
 ) -> None:
     """Write `count` frames of seeds `first_seed`… as PNG and their `labels.json` into a new folder.
 
-    With `masks` each frame's paint is written beside it.  `advance` is called after each frame.
+    With `masks` each frame's paint is written beside it.  `advance` is called after each frame.  InputError for
+    a layout or masks of rough floors.
     """
+    if level == ROUGH and (layout is not None or masks):
+        raise InputError(f"level {ROUGH} has no layouts and no masks; leave them out, or choose another level")
     folder.mkdir(parents=True, exist_ok=True)
     images = []
     for seed in range(first_seed, first_seed + count):
-        frame = generate(level, seed, width, height, colour, layout)
-        name = f"{level}-{seed:06d}.png"
-        cv2.imwrite(str(folder / name), frame.bgr, [cv2.IMWRITE_PNG_COMPRESSION, 1])
-        mask = f"{level}-{seed:06d}-mask.png" if masks else ""
+        name, mask = f"{level}-{seed:06d}.png", ""
         if masks:
+            frame = generate(level, seed, width, height, colour, layout)
+            bgr, label, mask = frame.bgr, frame.label, f"{level}-{seed:06d}-mask.png"
             cv2.imwrite(str(folder / mask), frame.mask())
-        images.append(msgspec.structs.replace(frame.label, file=name, mask=mask))
+        else:
+            bgr, label = frame_of_any_level(level, seed, width, height, colour, layout)
+        cv2.imwrite(str(folder / name), bgr, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        images.append(msgspec.structs.replace(label, file=name, mask=mask))
         advance()
     about: dict[str, object] = {"level": level, "first_seed": first_seed, "width": width, "height": height}
     write_labels(folder, Labels(images=images, about=about))

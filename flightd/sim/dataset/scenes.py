@@ -21,7 +21,8 @@ _LAYOUT_WEIGHTS = (0.17, 0.13, 0.16, 0.12, 0.11, 0.10, 0.07, 0.06, 0.08)
 THICKNESS_PX = (6.0, 200.0)
 """Range of line thickness in a picture 1920 wide; the upper end scales with the width."""
 
-_FAR = 1e5
+FAR = 1e5
+"""Where a band that goes on beyond the picture starts and ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +33,8 @@ class SceneBand:
     rho: float
     theta: float
     thickness: float
-    start: float = -_FAR
-    end: float = _FAR
+    start: float = -FAR
+    end: float = FAR
     taper: float = 0.0
 
     def point(self, along: float) -> tuple[float, float]:
@@ -190,16 +191,21 @@ def truth_nodes(scene: Scene) -> list[LabelledNode]:
                 _arms(band, band.along(*point), reach.thickness)
                 for band, reach in ((first, second), (second, first))
             ]
-            if 0 in arms:
+            if 0 in arms or not (_reaches(first, point, second) and _reaches(second, point, first)):
                 continue
             kind: NodeKind = {4: "+", 3: "T", 2: "L"}[sum(arms)]  # type: ignore[assignment]
-            met.update((k, b.start) for k, b, a in ((i, first, arms[0]), (j, second, arms[1])) if a == 1)
+            met.update(
+                (k, _nearest_end(band, band.along(*point)))
+                for k, band, arm in ((i, first, arms[0]), (j, second, arms[1]))
+                if arm == 1
+            )
             x, y = to_pixel(scene, *point)
             nodes.append(LabelledNode(x=x, y=y, kind=kind))
     for i, band in enumerate(scene.bands):
-        if band.start > -_FAR and (i, band.start) not in met and _inside(scene, *band.point(band.start)):
-            x, y = to_pixel(scene, *band.point(band.start))
-            nodes.append(LabelledNode(x=x, y=y, kind="end"))
+        for end in _ends(band):
+            if (i, end) not in met and _inside(scene, *band.point(end)):
+                x, y = to_pixel(scene, *band.point(end))
+                nodes.append(LabelledNode(x=x, y=y, kind="end"))
     return nodes
 
 
@@ -222,6 +228,20 @@ def _arms(band: SceneBand, along: float, reach: float) -> int:
     """In how many directions the band leaves a node that another band of thickness `reach` covers."""
     before, after = along - band.start > reach, band.end - along > reach
     return int(before) + int(after)
+
+
+def _ends(band: SceneBand) -> list[float]:
+    """Where, along it, the band ends: not far out of the picture."""
+    return [end for end in (band.start, band.end) if abs(end) < FAR]
+
+
+def _nearest_end(band: SceneBand, along: float) -> float:
+    return min(_ends(band), key=lambda end: abs(end - along))
+
+
+def _reaches(band: SceneBand, point: tuple[float, float], other: SceneBand) -> bool:
+    """Whether the band gets as far as the paint of another that it crosses in `point`."""
+    return band.start - other.thickness < band.along(*point) < band.end + other.thickness
 
 
 def _inside(scene: Scene, x: float, y: float) -> bool:
