@@ -166,14 +166,14 @@ def _band(stripe: Stripe, piece: _Piece, sight: FloorSight) -> SceneBand | None:
     way = centred[0][-1] - centred[0][0]
     lines = [_edge_line(edge[near], way) for edge, near in zip(centred, around, strict=True)]
     normal, rho = lines[0][0] + lines[1][0], lines[0][1] + lines[1][1]
-    length = float(np.hypot(*normal))
+    normal_x, normal_y = map(float, normal)
     centre = (centred[0] + centred[1]) / 2
     spot = centre[around[0] | around[1]].mean(axis=0)
     thickness = math.fsum(abs(float(edge_normal @ spot) - edge_rho) for edge_normal, edge_rho in lines)
-    band = SceneBand(rho / length, math.atan2(normal[1], normal[0]), thickness)
+    band = SceneBand(rho / math.hypot(normal_x, normal_y), math.atan2(normal_y, normal_x), thickness)
     onward = math.copysign(FAR, band.along(*way))
     ends = [
-        band.along(*centre[k]) if along_m[k] == at_m else beyond
+        float(band.along(*centre[k])) if along_m[k] == at_m else beyond
         for k, at_m, beyond in ((0, piece.start_m, -onward), (-1, piece.end_m, onward))
     ]
     return replace(band, start=min(ends), end=max(ends))
