@@ -42,7 +42,9 @@ def main() -> None:
     parser.add_argument("--masks", action="store_true", help="write each frame's paint mask (for training)")
     wanted = parser.parse_args()
     if wanted.level == ROUGH and (wanted.layout or wanted.masks):
-        parser.error(f"--level {ROUGH} has no --layout and no --masks; leave them out, or choose another level")
+        parser.error(
+            f"--level {ROUGH} has no --layout and no --masks; leave them out, or choose another level"
+        )
     width_px, height_px = wanted.size
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal) as progress:

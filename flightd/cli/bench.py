@@ -17,10 +17,11 @@ def register(app: typer.Typer) -> None:
 
 
 def bench(
-    seconds: Annotated[float, typer.Option(min=0.02, help="Time for each figure on all cores, and at most for each of the others.")] = 1.0,
-    frames: Annotated[
-        int, typer.Option(min=4, help="Frames of each size, of all levels alike many.")
-    ] = 60,
+    seconds: Annotated[
+        float,
+        typer.Option(min=0.02, help="Time for each figure on all cores, and at most for each of the others."),
+    ] = 1.0,
+    frames: Annotated[int, typer.Option(min=4, help="Frames of each size, of all levels alike many.")] = 60,
     one_core: Annotated[bool, typer.Option("--one-core", help="Leave out the run on all cores.")] = False,
     as_json: AsJson = False,
 ) -> None:

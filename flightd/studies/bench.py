@@ -106,9 +106,7 @@ def _flown(timing: Timing) -> Finder:
     """All that a flight asks of each frame: beside the lines the pads, the picture's check, features that are
     followed, markers."""
     lens = flown_lens(timing.size)
-    detector = Detector(
-        "combined", COLOUR, lens, markers=_MARKERS, in_flight=True, now_ns=thread_time_ns
-    )
+    detector = Detector("combined", COLOUR, lens, markers=_MARKERS, in_flight=True, now_ns=thread_time_ns)
 
     def detect(bgr: Image, number: int) -> None:
         found = detector.detect(bgr, number, (number + 1) * _FRAME_NS)

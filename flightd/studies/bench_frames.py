@@ -64,7 +64,7 @@ class BenchFrames:
         return np.array(self._open(size, "r")[-1])
 
     def of(self, size: Size, lens: Lens | None = None) -> Iterator[tuple[int, Image]]:
-        """Their numbers and the frames, each as new as from a camera, with a `lens` as that one shows them."""
+        """Their numbers and the frames, each as new as from a camera, as a `lens` shows them if given."""
         stored, bend = self._open(size, "r"), _Bend(lens) if lens is not None else None
         for number in range(self.count):
             straight = np.array(stored[number])

@@ -209,7 +209,4 @@ def _cover(box: Box, sight: FloorSight) -> tuple[Matrix, Matrix] | None:
 
 def _is_under(node: LabelledNode, covers: Sequence[tuple[Matrix, Matrix] | None]) -> bool:
     at = np.array([node.x, node.y])
-    return any(
-        bool(((at >= cover[0]) & (at <= cover[1])).all()) for cover in covers if cover is not None
-    )
-
+    return any(bool(((at >= cover[0]) & (at <= cover[1])).all()) for cover in covers if cover is not None)

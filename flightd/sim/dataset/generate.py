@@ -175,11 +175,13 @@ def write_dataset(
 ) -> None:
     """Write `count` frames of seeds `first_seed`… as PNG and their `labels.json` into a new folder.
 
-    With `masks` each frame's paint is written beside it.  `advance` is called after each frame.  InputError for
-    a layout or masks of rough floors.
+    With `masks` each frame's paint is written beside it.  `advance` is called after each frame.
+    Raises InputError for a layout or masks of rough floors.
     """
     if level == ROUGH and (layout is not None or masks):
-        raise InputError(f"level {ROUGH} has no layouts and no masks; leave them out, or choose another level")
+        raise InputError(
+            f"level {ROUGH} has no layouts and no masks; leave them out, or choose another level"
+        )
     folder.mkdir(parents=True, exist_ok=True)
     images = []
     for seed in range(first_seed, first_seed + count):

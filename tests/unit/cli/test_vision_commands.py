@@ -304,12 +304,17 @@ def test_training_without_paint_says_so(dataset: Path, tmp_path: Path) -> None:
 
 
 def test_bench_measures_every_method_in_units_of_a_conversion() -> None:
-    document = json.loads(run("bench", "--seconds", "0.02", "--one-core", "--json"))
+    document = json.loads(run("bench", "--seconds", "0.02", "--frames", "4", "--one-core", "--json"))
+    assert document["levels"] == ["clean", "perturbed", "hard", "rough"]
     rows = {(row["method"], row["width"]): row for row in document["results"]}
     for width in (1920, 640):
         assert rows["cvtColor", width]["cvtcolor_units"] == 1.0
         for method in ("centroid", "skeleton", "combined", "naive", "LSD + merging"):
             assert rows[method, width]["fps_one_core"] > 0
+        for method in ("combined", "combined, in flight"):
+            assert rows[method, width]["frames"] == 4
+            assert min(rows[method, width]["ms_median_of_level"].values()) > 0
+        assert {"pads", "features", "markers"} < rows["combined, in flight", width]["stages_ms"].keys()
     assert rows["centroid", 1920]["paper_fps"] == {"on_board": 4.23, "off_board": 15.1}
 
 
