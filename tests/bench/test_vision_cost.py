@@ -1,31 +1,41 @@
-"""What the line detectors cost at 1920x1080, in units of one cvtColor(BGR2HSV) of the same frame.
+"""What the line detectors cost, in units of one cvtColor(BGR2HSV) of the same frame, and what a flight adds.
 
-Processor time of one core, as `flightd bench` measures it.
+Processor time of one core on cold frames of all levels, as `flightd bench` measures it.
 """
 
 from __future__ import annotations
 
 import pytest
 
-from flightd.studies.bench import UNIT, Timing, bench
+from flightd.studies.bench import IN_FLIGHT, Timing, bench
 
-LIMITS = {"centroid": 1.6, "skeleton": 1.6, "combined": 2.5}
-"""Ceilings against a slow change creeping in; what is reached is about half of them."""
+FULL, FLOWN = (1920, 1080), (640, 360)
+LIMITS = {"centroid": 1.7, "skeleton": 2.4, "combined": 3.0}
+"""Ceilings against a slow change creeping in: two thirds above what is measured on a busy machine."""
+MOST_BESIDES = 2.6
+"""All that a flight asks of a frame, as a multiple of the lines alone; measured: 1.7."""
+FRAMES = 16
+
+Timings = dict[tuple[str, tuple[int, int]], Timing]
 
 
 @pytest.fixture(scope="module")
-def timings() -> dict[str, Timing]:
-    return {timing.method: timing for timing in bench(0.25, ((1920, 1080),), all_cores=False)}
+def timings() -> Timings:
+    timed = bench(0.25, (FULL, FLOWN), all_cores=False, frames=FRAMES)
+    return {(timing.method, timing.size): timing for timing in timed}
 
 
 @pytest.mark.parametrize("method", LIMITS)
-def test_a_full_frame_costs_no_more_than_a_colour_conversion_or_two(
-    timings: dict[str, Timing], method: str
-) -> None:
-    assert timings[method].median_ms / timings[UNIT].median_ms < LIMITS[method]
+def test_a_full_frame_costs_no_more_than_a_few_colour_conversions(timings: Timings, method: str) -> None:
+    assert len(timings[method, FULL].ms) == FRAMES
+    assert timings[method, FULL].median_units < LIMITS[method]
 
 
-def test_every_method_is_faster_than_what_one_would_pick_instead(timings: dict[str, Timing]) -> None:
-    slowest = max(timings[method].median_ms for method in LIMITS)
+def test_what_a_flight_asks_besides_costs_little_more_than_the_lines(timings: Timings) -> None:
+    assert timings[IN_FLIGHT, FLOWN].median_ms < MOST_BESIDES * timings["combined", FLOWN].median_ms
+
+
+def test_every_method_is_faster_than_what_one_would_pick_instead(timings: Timings) -> None:
+    slowest = max(timings[method, FULL].median_ms for method in LIMITS)
     for baseline in ("naive, every pixel", "textbook centroid", "LSD + merging"):
-        assert slowest < timings[baseline].median_ms
+        assert slowest < timings[baseline, FULL].median_ms

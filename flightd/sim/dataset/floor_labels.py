@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from flightd.core.camera_view import CameraView
 from flightd.core.geometry import Matrix
@@ -55,13 +56,12 @@ class FloorSight:
             seen = first + late * (last - first)
         return seen
 
-    def is_around(self, pixels: Matrix) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def is_around(self, pixels: Matrix) -> NDArray[np.bool_]:
         """(N,) whether pixels lie in the picture or near it."""
         size = np.array([self.width, self.height])
-        inside: np.ndarray[tuple[int], np.dtype[np.bool_]] = (
-            (pixels > -_AROUND * size) & (pixels < (1.0 + _AROUND) * size)
-        ).all(axis=1)
-        return inside
+        inside = (pixels > -_AROUND * size) & (pixels < (1.0 + _AROUND) * size)
+        around: NDArray[np.bool_] = np.logical_and.reduce(inside, axis=1)
+        return around
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +92,8 @@ def floor_labels(
             band = _band(stripe, piece, sight)
             if band is None:
                 continue
-            for line in truth_lines(_scene((band,), sight)):
-                lines.append(line if piece.is_whole else msgspec.structs.replace(line, grade="minor"))
+            seen = truth_lines(_scene((band,), sight))
+            lines += seen if piece.is_whole else [_minor(line) for line in seen]
             cut += _cut_ends(stripe, piece, sight)
     covers = [_cover(box, sight) for box in hidden]
     nodes = [
@@ -101,6 +101,10 @@ def floor_labels(
         for node in truth_nodes(_scene(tuple(bands), sight))
     ]
     return lines, nodes + cut
+
+
+def _minor(line: LabelledLine) -> LabelledLine:
+    return msgspec.structs.replace(line, grade="minor")
 
 
 def _scene(bands: tuple[SceneBand, ...], sight: FloorSight) -> Scene:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import cast
 
 import numpy as np
 
@@ -135,5 +134,5 @@ def rough_frame(
     seed: int, width_px: int, height_px: int, colour: str | None = None
 ) -> tuple[Image, LabelledImage]:
     """The frame that belongs to these arguments; `FRAMES_A_HALL` seeds in a row share a hall."""
-    hall = cast("RoughHall", _hall(seed // FRAMES_A_HALL, width_px, height_px, colour))
+    hall = _hall(seed // FRAMES_A_HALL, width_px, height_px, colour)
     return hall.frame(seed % FRAMES_A_HALL)

@@ -6,6 +6,7 @@ when it was found again in a second frame, forwards and backwards, and moved as 
 
 from __future__ import annotations
 
+import math
 from typing import Any, TypeAlias
 
 import cv2
@@ -24,6 +25,8 @@ _WIDTH_PX = 160
 _MOST, _ENOUGH, _FEWEST = 24, 12, 4
 """Points followed; fewer than `_ENOUGH` are made up; fewer than `_FEWEST` agree by chance."""
 _APART_PX = 10.0
+_REACH = math.ceil(_APART_PX) - 1
+"""Whole pixels that are nearer than that."""
 _QUALITY = 0.02
 _CONTRAST = 1e-3
 """Least eigenvalue of a corner's structure tensor (detail of 0..1): flatter ones are noise."""
@@ -146,14 +149,17 @@ def _followed(before: Image, now: Image, at: Array) -> tuple[Array, Array]:
 def _spread(rows: Array, columns: Array, strength: Array, most: int) -> list[int]:
     """The strongest, none nearer than `_APART_PX` to a stronger one."""
     chosen: list[int] = []
-    for candidate in np.argsort(-strength)[: 8 * most]:
+    order = np.argsort(-strength)[: 8 * most]
+    down, right = rows + _REACH, columns + _REACH
+    near = np.zeros((int(down.max(initial=0)) + _REACH + 1, int(right.max(initial=0)) + _REACH + 1), bool)
+    for candidate, row, column in zip(
+        order.tolist(), down[order].tolist(), right[order].tolist(), strict=True
+    ):
         if len(chosen) == most:
             break
-        near = (abs(columns[candidate] - columns[chosen]) < _APART_PX) & (
-            abs(rows[candidate] - rows[chosen]) < _APART_PX
-        )
-        if not near.any():
-            chosen.append(int(candidate))
+        if not near[row, column]:
+            chosen.append(candidate)
+            near[row - _REACH : row + _REACH + 1, column - _REACH : column + _REACH + 1] = True
     return chosen
 
 
