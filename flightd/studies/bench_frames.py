@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -12,6 +13,7 @@ import cv2
 import numpy as np
 
 from flightd.core.distortion import undistorted
+from flightd.core.errors import UnavailableError
 from flightd.core.geometry import Lens
 from flightd.core.types import Image
 from flightd.runtime.undisturbed_start import undisturbed
@@ -51,8 +53,8 @@ class BenchFrames:
         numbers = sorted(range(-1, self.count), key=lambda n: n % len(LEVEL_NAMES))
         starts = range(0, len(numbers), FRAMES_A_HALL)
         jobs = [(size, numbers[at : at + FRAMES_A_HALL]) for size in sizes for at in starts]
-        for width, height in sizes:
-            self._open((width, height), "w+")
+        for size in sizes:
+            self._reserve(size)
         with ProcessPoolExecutor(cores, get_context("spawn")) as pool:
             with undisturbed():
                 done = [pool.submit(self._draw, size, some) for size, some in jobs]
@@ -70,6 +72,20 @@ class BenchFrames:
             straight = np.array(stored[number])
             yield number, straight if bend is None else bend(straight)
 
+    def _reserve(self, size: Size) -> None:
+        """A file that has its room; without, whoever writes to it dies of a signal.  UnavailableError."""
+        try:
+            with self._path(size).open("wb") as file:
+                os.posix_fallocate(file.fileno(), 0, (self.count + 1) * size[0] * size[1] * 3)
+        except OSError as err:
+            raise UnavailableError(
+                f"no room for the frames in {self._folder.parent} ({err.strerror}); let TMPDIR name a "
+                "folder that has some, or ask for fewer --frames"
+            ) from err
+
+    def _path(self, size: Size) -> Path:
+        return self._folder / f"{size[0]}x{size[1]}"
+
     def _draw(self, size: Size, numbers: Sequence[int]) -> None:
         stored = self._open(size, "r+")
         for number in numbers:
@@ -78,7 +94,7 @@ class BenchFrames:
     def _open(self, size: Size, mode: str) -> Image:
         width, height = size
         shape = (self.count + 1, height, width, 3)
-        return np.memmap(self._folder / f"{width}x{height}", np.uint8, mode, shape=shape)  # type: ignore[call-overload,no-any-return]
+        return np.memmap(self._path(size), np.uint8, mode, shape=shape)  # type: ignore[call-overload,no-any-return]
 
 
 class _Bend:
