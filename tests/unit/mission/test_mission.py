@@ -18,7 +18,7 @@ from flightd.core.types import (
     Phase,
 )
 from flightd.mission.flight.relocation import Relocator
-from flightd.mission.guidance import ALL_WELL, Guide
+from flightd.mission.guidance import ALL_WELL, Guide, Warnings
 from flightd.mission.machine import Intent, State
 from flightd.mission.scan.scanner import Scanner
 from tests.unit.mission import shelves
@@ -278,12 +278,16 @@ def test_a_take_off_whose_picture_shows_nothing_new_lands(
     assert flight.phase is (Phase.LAND if lands else Phase.TAKE_OFF)
 
 
-@pytest.mark.parametrize("what", ["frozen_s", "blank_s", "frame_age_s"])
-def test_a_take_off_climbs_no_further_by_old_pictures(what: str) -> None:
+@pytest.mark.parametrize(
+    "old",
+    [replace(ALL_WELL, frozen_s=0.3), replace(ALL_WELL, blank_s=0.3), replace(ALL_WELL, frame_age_s=0.3)],
+    ids=["frozen", "blank", "stale"],
+)
+def test_a_take_off_climbs_no_further_by_old_pictures(old: Warnings) -> None:
     flight = Flight(configured(height_m=4.2))
     flight.to(Phase.TAKE_OFF)
     flight.run(5.0, lambda: flight.inputs.height_m > 0.9)
-    flight.set(x_age_s=0.3, y_age_s=0.3, warnings=replace(ALL_WELL, **{what: 0.3}))
+    flight.set(x_age_s=0.3, y_age_s=0.3, warnings=old)
     flight.run(0.5)
     assert flight.phase is Phase.TAKE_OFF
     assert flight.inputs.height_m < 0.95
