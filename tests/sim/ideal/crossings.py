@@ -1,54 +1,88 @@
-"""A bench for counting nodes: thousands of simulated crossings, at the level of tracked lines.
+"""A bench for counting nodes: thousands of simulated crossings of a floor whose paint differs from its map.
 
-The drone flies random routes on a floor whose paint differs from the map: cross lines are missing, false
-ones were stuck down.  Gusts push it about, its heading sways, its height changes, lines flicker and the
-camera is blind now and then.  Only what the line tracker tells reaches the localiser; the truth judges
-what it says at each node flown over.
+The drone flies random routes from its pad.  Parts of the lines are gone, false ones were stuck down.  Gusts
+push it about, its heading sways, its height changes, lines flicker and the camera is blind now and then.
+What is seen, in pixels, goes the way that it goes in flight: the state estimator follows the lines, carries
+itself on while none is seen, and tells where it is.  Only the judge knows the truth.
 
-    python -m tests.sim.ideal.crossings 10000      # the whole bench: two minutes or so
+    python -m tests.sim.ideal.crossings 10000            # the whole bench: 40 CPU minutes or so
+    python -m tests.sim.ideal.crossings 1000 --grid random --missing 0.05 --false 0.02 --from 251
 """
 
 from __future__ import annotations
 
+import argparse
+import enum
 import math
 import random
 import sys
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
-from flightd.config.localisation import LocalisationConfig
-from flightd.core.camera_view import FloorReach
-from flightd.core.tracks import FloorJunction, TrackedLine, TrackSet
-from flightd.core.types import GridPose
+from flightd.config.schema import load_config
+from flightd.core.geometry import wrap_pi
+from flightd.core.tick import TickInput
+from flightd.core.types import GridPose, Junction, JunctionKind, LineSet
 from flightd.localisation.grid_localiser import GridLocaliser
+from flightd.localisation.state_estimator import StateEstimator
+from flightd.sim.plant.wind import WindParams
 from flightd.sim.random_sites import random_site
-from flightd.site.painted_lines import PaintMap
-from flightd.site.site import PaintedLine, Site
+from flightd.site.nearest_node import NodeIndex
+from flightd.site.site import Site
+from tests.sim.ideal.crossing_floors import uniform_grid, worn
+from tests.sim.ideal.crossing_motion import STEP_S, Motion
+from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
 
-STEP_S = 0.06
-SURE = 0.95
-_HALF_LONG, _HALF_SHORT = 0.80, 0.44
-"""Half the picture's sides at unit height, a little inside 80 deg x 50 deg."""
+CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
+SURE = CONFIG.mission.integrity_min
+LEAST_AVAILABILITY = 0.9
+_FRAME_STEPS = 4
+"""A frame every 80 ms: what a small computer manages."""
+_LATE_STEPS = 3
+_TURN_RADPS = math.radians(CONFIG.mission.turn_rate_degps)
+_ACCEL_MPS2 = 0.8
+_SKEW_RAD = 0.1
+_STRAIGHT = 0.7
+"""How often it flies on straight where it can."""
+_JUNCTION_SEEN = 0.85
+_KINDS = {1: JunctionKind.END, 2: JunctionKind.CORNER, 3: JunctionKind.TEE, 4: JunctionKind.CROSS}
+_WORDS = {int: "whole number", float: "number"}
+_CHUNK = 40
+"""So many crossings make a flight."""
+
+
+class Grid(enum.StrEnum):
+    """Sites to fly over."""
+
+    UNIFORM = "uniform"
+    RANDOM = "random"
+
+    def site(self, seed: int) -> Site:
+        return uniform_grid(seed) if self is Grid.UNIFORM else random_site(seed)
 
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """What differs from the map and disturbs the flight: shares per cross line or node, metres, radians."""
+    """What differs from the map and disturbs the flight."""
 
-    missing: float = 0.05
-    false: float = 0.02
-    gust_m: float = 0.06
+    missing: float = 0.2
+    """Share of the lines' parts, cell by cell, that are gone."""
+    false: float = 0.3
+    """Lines in each cell that the map does not have."""
+    gust_mps: float = WindParams().gust_rms_mps
     yaw_rad: float = math.radians(5.0)
-    heading_error_rad: float = math.radians(0.4)
-    offset_m: float = 0.008
-    velocity_mps: float = 0.04
-    blind: float = 0.02
+    blind: float = 0.05
+    """Share of the ways between nodes on which nothing at all is seen for up to a second."""
     flicker: float = 0.04
     arms_wrong: float = 0.03
 
 
 @dataclass(slots=True)
 class Count:
-    """Nodes flown over, and how often the node told was wrong: while sure of it, and while in doubt."""
+    """Nodes flown over: at how many the drone was sure of its place, and at how many it was so and was wrong
+    there or on the way there; and at how many it was wrong and in doubt."""
 
     crossings: int = 0
     undetected: int = 0
@@ -59,28 +93,20 @@ class Count:
     def availability(self) -> float:
         return self.sure / max(self.crossings, 1)
 
+    @property
+    def words(self) -> str:
+        return (
+            f"{self.crossings} crossings, {self.undetected} miscounted unnoticed, {self.doubted_wrong} wrong"
+            f" in doubt, availability {self.availability:.3f}"
+        )
+
     def add(self, other: Count) -> None:
-        self.crossings += other.crossings
-        self.undetected += other.undetected
-        self.doubted_wrong += other.doubted_wrong
-        self.sure += other.sure
-
-
-def worn(site: Site, trouble: Trouble, rng: random.Random) -> Site:
-    """The floor as it really is: paint of the site less some cross lines, with some false ones."""
-    lines = [p for p in site.lines if p.x0_m != p.x1_m or rng.random() >= trouble.missing]
-    for aisle in site.aisles:
-        for _ in range(aisle.size):
-            if rng.random() < trouble.false:
-                x = rng.uniform(aisle.x_m, aisle.end_x_m)
-                reach = rng.uniform(0.2, 0.6)
-                if min(abs(x - p.x0_m) for p in site.lines if p.x0_m == p.x1_m) > 0.15:
-                    lines.append(PaintedLine(x, aisle.y_m - reach, x, aisle.y_m + reach, site.line_width_m))
-    return replace(site, lines=tuple(lines))
+        for one in fields(self):
+            setattr(self, one.name, getattr(self, one.name) + getattr(other, one.name))
 
 
 class Flight:
-    """One flight along a random route; the localiser starts from `believed`, the truth from `start`."""
+    """One flight along a random route; the estimator starts from `believed`, the truth from `start`."""
 
     def __init__(
         self,
@@ -90,219 +116,221 @@ class Flight:
         *,
         start: str = "",
         believed: str = "",
-        config: LocalisationConfig | None = None,
+        floor: Site | None = None,
     ) -> None:
+        """`floor` has the paint as it is; None: it is worn as `trouble` says."""
         self.site = site
-        self._rng = random.Random(f"crossings {seed}")
+        self._rng = rng = random.Random(f"crossings {seed}")
         self._trouble = trouble
-        floor = worn(site, trouble, self._rng)
-        self._lines = floor.lines
-        paint = PaintMap.of(floor)
-        self._features = [
-            (float(x), float(y), int(arms))
-            for features in (paint.crossings, paint.ends)
-            for (x, y), arms in zip(features.at_m, features.arms, strict=True)
-        ]
-        self._here = start or self._rng.choice(sorted(site.nodes))
-        self.localiser = GridLocaliser(
-            site, believed or self._here, FloorReach(), config or LocalisationConfig()
-        )
+        self._here = start or site.home.node
+        floor = floor or worn(site, trouble.missing, trouble.false, rng)
+        camera = CONFIG.camera
+        errors = EyeErrors(1.0, 0.002, trouble.flicker)
+        self._eye = IdealEye(floor, camera.lens(), camera.mount(), errors, seed)
+        self._estimator = StateEstimator(site, CONFIG, SURE, (believed or self._here, 0.0))
+        self._estimator.begin((believed or self._here, 0.0), armed=True)
         node = site.nodes[self._here]
-        self._x, self._y = node.x_m, node.y_m
-        self._gust = [0.0, 0.0]
-        self._sway = self._heading_error = 0.0
-        self._height = self._rng.uniform(1.2, 2.4)
-        self._yaw = 0.0
-        self._now_ns = 10**9
+        self._ref_m = node.x_m, node.y_m
+        self._motion = Motion(rng, self._ref_m, trouble.gust_mps, trouble.yaw_rad)
+        self._yaw_rad = 0.0
+        self._nodes = NodeIndex(site)
+        self._steps = 0
         self._blind_s = 0.0
-        self._tracks: dict[int, tuple[int, int, int]] = {}
-        self._next_id = 0
+        self._coming: LineSet | None = None
+        self._attitudes = [self._motion.attitude]
+        self._along = rng.random() < 0.5
+        self._speed_mps = 0.0
+        self._half_m = 0.5 * min(site.distance_m(edge.a, edge.b) for edge in site.edges)
+        self._pose: GridPose | None = None
         self._before = ""
+        self.astray = False
+        """Was sure of a place that is another since the last node."""
 
     @property
     def node(self) -> str:
-        """The node that the drone is really at."""
-        return self._here
+        """The node that the drone is really nearest to: it lags behind the point that it follows."""
+        x_m, y_m = self._motion.at_m
+        return self._nodes.node(x_m, y_m).id
 
     @property
     def pose(self) -> GridPose:
-        """What the localiser said last."""
+        """What the estimator said last."""
+        assert self._pose is not None
         return self._pose
 
     @property
+    def localiser(self) -> GridLocaliser:
+        return self._estimator.localiser
+
+    @property
     def wrong_and_sure(self) -> bool:
-        return self._pose.node != self._here and self._pose.integrity >= SURE
+        return self.pose.node != self.node and self.pose.integrity >= SURE
 
     def hover(self, seconds: float) -> GridPose:
         """Stay over the node."""
-        node = self.site.nodes[self._here]
         for _ in range(max(round(seconds / STEP_S), 1)):
-            self._step(node.x_m, node.y_m)
-        return self._pose
+            self._step((0.0, 0.0))
+        return self.pose
 
     def fly(self, crossings: int, dwell_s: float = 1.0) -> Count:
-        """Fly over so many nodes."""
-        count = Count()
+        """Fly over so many nodes along a random route."""
+        return self.follow(self._random_route(), crossings, dwell_s)
+
+    def follow(self, route: Iterator[str], crossings: int, dwell_s: float = 1.0) -> Count:
+        """Fly over so many nodes of a route, each a neighbour of the one before."""
+        count, rng = Count(), self._rng
         self.hover(dwell_s)
+        goal = next(route)
         while count.crossings < crossings:
-            self._leg(self._choose())
-            node = self._here
-            if self._rng.random() < 0.3:
+            self.astray = False
+            onward = next(route, self._here)
+            turns = abs(wrap_pi(self._bearing(goal, onward) - self._bearing(self._here, goal))) > _SKEW_RAD
+            stops = turns or rng.random() < 0.3
+            self._leg(goal, stops=stops)
+            if stops:
                 self.hover(dwell_s)
-            pose = self._pose
-            wrong = pose.node != node
-            sure = pose.integrity >= SURE
+            wrong, sure = self.pose.node != self.node, self.pose.integrity >= SURE
             count.crossings += 1
             count.sure += sure
-            count.undetected += wrong and sure
+            count.undetected += self.astray or (wrong and sure)
             count.doubted_wrong += wrong and not sure
+            goal = onward
         return count
 
-    def _choose(self) -> str:
-        ways = self.site.neighbours(self._here)
-        ways = tuple(way for way in ways if self._painted(way))
-        onward = [way for way in ways if way != self._before] or list(ways)
-        self._before = self._here
-        return self._rng.choice(onward)
+    def _random_route(self) -> Iterator[str]:
+        """Straight on rather than not, and back only from a dead end."""
+        before, node = self._before, self._here
+        while True:
+            onward = [way for way in self.site.neighbours(node) if way != before] or [before]
+            if before and self._rng.random() < _STRAIGHT:
+                came = self._bearing(before, node)
+                ahead = [w for w in onward if abs(wrap_pi(self._bearing(node, w) - came)) < _SKEW_RAD]
+                onward = ahead or onward
+            before, node = node, self._rng.choice(onward)
+            yield node
 
-    def _painted(self, goal: str) -> bool:
-        """The line to this neighbour is there: without it nobody flies it."""
-        a, b = self.site.nodes[self._here], self.site.nodes[goal]
-        if a.aisle == b.aisle:
-            return True
-        low, high = sorted((a.y_m, b.y_m))
-        return any(
-            p.x0_m == p.x1_m
-            and abs(p.x0_m - a.x_m) < 0.02
-            and min(p.y0_m, p.y1_m) <= low
-            and high <= max(p.y0_m, p.y1_m)
-            for p in self._lines
-        )
+    def _bearing(self, start: str, end: str) -> float:
+        a, b = self.site.nodes[start], self.site.nodes[end]
+        return math.atan2(b.y_m - a.y_m, b.x_m - a.x_m)
 
-    def _leg(self, goal: str) -> None:
-        a, b = self.site.nodes[self._here], self.site.nodes[goal]
-        length = math.hypot(b.x_m - a.x_m, b.y_m - a.y_m)
-        speed = self._rng.uniform(0.6, 1.2)
-        self._yaw = math.atan2(b.y_m - a.y_m, b.x_m - a.x_m)
-        if self._rng.random() < self._trouble.blind:
-            self._blind_s = self._rng.uniform(0.2, 1.0)
-        steps = max(round(length / (speed * STEP_S)), 1)
-        for i in range(1, steps + 1):
-            share = i / steps
-            self._step(a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m))
-        self._here = goal
+    def _leg(self, goal: str, *, stops: bool) -> None:
+        rng, a, b = self._rng, self.site.nodes[self._here], self.site.nodes[goal]
+        bearing = self._bearing(self._here, goal)
+        if self._along:
+            self._turn_to(bearing)
+        if rng.random() < self._trouble.blind:
+            self._blind_s = rng.uniform(0.2, 1.0)
+        c, s = math.cos(bearing), math.sin(bearing)
+        length, most_mps, gone_m = self.site.distance_m(self._here, goal), rng.uniform(0.6, 1.2), 0.0
+        while gone_m < length:
+            braked = math.sqrt(2.0 * _ACCEL_MPS2 * (length - gone_m)) + 0.05 if stops else math.inf
+            self._speed_mps = min(self._speed_mps + _ACCEL_MPS2 * STEP_S, most_mps, braked)
+            gone_m = min(gone_m + self._speed_mps * STEP_S, length)
+            self._ref_m = a.x_m + c * gone_m, a.y_m + s * gone_m
+            self._step((c * self._speed_mps, s * self._speed_mps))
+        self._before, self._here, self._ref_m = self._here, goal, (b.x_m, b.y_m)
+        if stops:
+            self._speed_mps = 0.0
 
-    def _step(self, x_m: float, y_m: float) -> None:
-        rng, t = self._rng, self._trouble
-        keep = math.exp(-STEP_S / 1.0)
-        stir = math.sqrt(1.0 - keep * keep)
-        self._gust = [keep * g + stir * rng.gauss(0.0, t.gust_m) for g in self._gust]
-        self._sway = max(
-            -t.yaw_rad, min(t.yaw_rad, keep * self._sway + stir * rng.gauss(0.0, t.yaw_rad / 1.5))
-        )
-        self._heading_error = keep * self._heading_error + stir * rng.gauss(0.0, t.heading_error_rad)
-        self._height = min(max(self._height + rng.gauss(0.0, 0.02), 1.0), 3.0)
-        x, y = x_m + self._gust[0], y_m + self._gust[1]
-        vx, vy = (x - self._x) / STEP_S, (y - self._y) / STEP_S
-        self._x, self._y = x, y
-        self._now_ns += round(STEP_S * 1e9)
-        self._blind_s -= STEP_S
-        self._pose = self.localiser.step(self._seen(vx, vy), self._height)
-
-    def _seen(self, vx: float, vy: float) -> TrackSet:
-        """What the line tracker would tell now."""
-        rng, t = self._rng, self._trouble
-        across: tuple[list[TrackedLine], list[TrackedLine]] = ([], [])
-        junctions: list[FloorJunction] = []
-        if self._blind_s <= 0.0:
-            for index, line in enumerate(self._lines):
-                visible = self._clip(line)
-                if visible is not None and rng.random() >= t.flicker:
-                    id_, hits, _ = self._tracks.get(index, (self._next_id, 0, 0))
-                    self._next_id += id_ == self._next_id
-                    self._tracks[index] = (id_, hits + 2, self._now_ns)
-            for x, y, arms in self._features:
-                dx, dy = x - self._x, y - self._y
-                if self._inside(dx, dy, 0.92) and rng.random() < 0.85:
-                    flip = 1 << rng.randrange(4) if rng.random() < t.arms_wrong else 0
-                    if arms ^ flip:
-                        junctions.append(
-                            FloorJunction(dx + rng.gauss(0, 0.015), dy + rng.gauss(0, 0.015), arms ^ flip)
-                        )
-        for index, (id_, hits, seen_ns) in list(self._tracks.items()):
-            line = self._lines[index]
-            visible = self._clip(line)
-            if visible is None or self._now_ns - seen_ns > 2_000_000_000:
-                del self._tracks[index]
-                continue
-            axis = 0 if line.x0_m == line.x1_m else 1
-            offset = line.x0_m - self._x if axis == 0 else line.y0_m - self._y
-            middle = 0.5 * (visible[0] + visible[1])
-            offset += rng.gauss(0.0, t.offset_m) + self._heading_error * middle
-            sigma = math.hypot(t.offset_m, 0.01 * middle) + 0.004
-            across[axis].append(
-                TrackedLine(id_, offset, sigma, line.width_m, seen_ns, hits, visible[0], visible[1])
+    def _turn_to(self, yaw_rad: float) -> None:
+        """Turn on the spot."""
+        while (left := wrap_pi(yaw_rad - self._yaw_rad)) != 0.0:
+            most = _TURN_RADPS * STEP_S
+            self._yaw_rad = (
+                yaw_rad if abs(left) < most else wrap_pi(self._yaw_rad + math.copysign(most, left))
             )
-        return TrackSet(
-            self._now_ns,
-            self._now_ns,
-            self._yaw + self._sway,
-            0.01,
-            vx + rng.gauss(0.0, t.velocity_mps),
-            vy + rng.gauss(0.0, t.velocity_mps),
-            0.0,
-            0.0,
-            tuple(across[0]),
-            tuple(across[1]),
-            junctions=tuple(junctions),
-            junctions_ns=self._now_ns,
+            self._step((0.0, 0.0))
+
+    def _step(self, speed_mps: tuple[float, float]) -> None:
+        motion = self._motion
+        motion.step(self._ref_m, speed_mps, self._yaw_rad)
+        self._attitudes.append(motion.attitude)
+        self._blind_s -= STEP_S
+        self._steps += 1
+        if self._steps % _FRAME_STEPS == 0:
+            self._coming = self._see()
+        if self._coming is None or self._steps % _FRAME_STEPS != _LATE_STEPS:
+            return
+        tick = TickInput(
+            motion.now_ns, (self._coming,), motion.told(self._attitudes[-1]), tuple(self._attitudes)
         )
+        self._attitudes.clear()
+        self._estimator.take(tick, None)
+        told = self._estimator.step(motion.now_ns)
+        self._pose = told.pose
+        if self._pose is not None:
+            off_m = math.dist(motion.at_m, (self._pose.x_m, self._pose.y_m))
+            self.astray |= off_m > self._half_m and self._pose.integrity >= SURE
 
-    def _inside(self, dx: float, dy: float, share: float) -> bool:
-        c, s = math.cos(self._yaw + self._sway), math.sin(self._yaw + self._sway)
-        return (
-            abs(c * dx + s * dy) < share * _HALF_LONG * self._height
-            and abs(c * dy - s * dx) < share * _HALF_SHORT * self._height
-        )
+    def _see(self) -> LineSet:
+        """What a detector would tell of a picture taken now."""
+        rng, seen = self._rng, self._eye.see(self._motion.kinematics, self._steps, self._motion.now_ns)
+        if self._blind_s > 0.0:
+            return replace(seen, lines=(), junctions=(), pads=())
+        told = (self._mistaken(one) for one in seen.junctions if rng.random() < _JUNCTION_SEEN)
+        return replace(seen, junctions=tuple(one for one in told if one is not None))
 
-    def _clip(self, line: PaintedLine) -> tuple[float, float] | None:
-        """The part of the line in the picture, along it from the drone (Liang-Barsky), if it is 0.15 m."""
-        x0, y0 = line.x0_m - self._x, line.y0_m - self._y
-        dx, dy = line.x1_m - line.x0_m, line.y1_m - line.y0_m
-        reach = 0.92 * self._height
-        if (abs(x0) > reach) if dx == 0.0 else (abs(y0) > reach):
-            return None
-        c, s = math.cos(self._yaw + self._sway), math.sin(self._yaw + self._sway)
-        low, high = 0.0, 1.0
-        for start, way, half in (
-            (c * x0 + s * y0, c * dx + s * dy, _HALF_LONG * self._height),
-            (c * y0 - s * x0, c * dy - s * dx, _HALF_SHORT * self._height),
-        ):
-            if abs(way) < 1e-9:
-                if abs(start) > half:
-                    return None
-                continue
-            a, b = sorted(((-half - start) / way, (half - start) / way))
-            low, high = max(low, a), min(high, b)
-        length = math.hypot(dx, dy)
-        if (high - low) * length < 0.15:
-            return None
-        origin, way = (y0, dy) if dx == 0.0 else (x0, dx)
-        ends = sorted((origin + low * way, origin + high * way))
-        return ends[0], ends[1]
+    def _mistaken(self, junction: Junction) -> Junction | None:
+        """The junction, now and then with an arm too many or too few."""
+        if self._rng.random() >= self._trouble.arms_wrong:
+            return junction
+        other = junction.arms_rad[0] + self._rng.randrange(4) * math.pi / 2
+        arms = tuple(arm for arm in junction.arms_rad if abs(wrap_pi(arm - other)) > math.pi / 4)
+        if len(arms) == len(junction.arms_rad):
+            arms = *arms, wrap_pi(other)
+        return replace(junction, kind=_KINDS[len(arms)], arms_rad=arms) if arms else None
 
 
-def bench(crossings: int, trouble: Trouble | None = None, per_flight: int = 40, first_seed: int = 1) -> Count:
-    """Fly over at least so many nodes on random sites, a new one for each flight."""
+def bench(
+    crossings: int,
+    grid: Grid = Grid.UNIFORM,
+    trouble: Trouble | None = None,
+    first_seed: int = 1,
+    told: Callable[[int, Count], None] = lambda _seed, _count: None,
+) -> Count:
+    """Fly over so many nodes, on a new site with each flight; `told` hears of each flight."""
     total = Count()
     seed = first_seed
     while total.crossings < crossings:
-        flight = Flight(random_site(seed), seed, trouble or Trouble())
-        total.add(flight.fly(min(per_flight, crossings - total.crossings)))
+        flight = Flight(grid.site(seed), seed, trouble or Trouble())
+        count = flight.fly(min(_CHUNK, crossings - total.crossings))
+        told(seed, count)
+        total.add(count)
         seed += 1
     return total
 
 
+def _number(least: float, most: float, kind: type[int | float] = float) -> Callable[[str], float]:
+    def parsed(text: str) -> float:
+        with suppress(ValueError):
+            if least <= kind(text) <= most:
+                return kind(text)
+        raise argparse.ArgumentTypeError(f"{text!r} is no {_WORDS[kind]} from {least:.8g} to {most:.8g}")
+
+    return parsed
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Exit 0 where no node was miscounted unnoticed and enough were told surely."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("crossings", type=_number(1, 10_000_000, int), nargs="?", default=10_000)
+    parser.add_argument("--grid", choices=[grid.value for grid in Grid], default=Grid.UNIFORM.value)
+    usual = Trouble()
+    share, lines = _number(0.0, 1.0), _number(0.0, 5.0)
+    parser.add_argument("--missing", type=share, default=usual.missing, help="share of the lines' parts")
+    parser.add_argument("--false", type=lines, default=usual.false, help="lines in each cell")
+    parser.add_argument("--blind", type=share, default=usual.blind, help="share of the ways between nodes")
+    parser.add_argument("--from", dest="first", type=_number(0, 10**9, int), default=1, help="first seed")
+    given = parser.parse_args(arguments)
+
+    def told(seed: int, count: Count) -> None:
+        print(f"seed {seed}: {count.words}", flush=True)
+
+    trouble = Trouble(missing=given.missing, false=given.false, blind=given.blind)
+    total = bench(given.crossings, Grid(given.grid), trouble, given.first, told)
+    print(f"in all: {total.words}")
+    return 0 if total.undetected == 0 and total.availability >= LEAST_AVAILABILITY else 1
+
+
 if __name__ == "__main__":
-    counted = bench(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000)
-    print(counted, f"availability {counted.availability:.4f}")
+    sys.exit(main(sys.argv[1:]))
