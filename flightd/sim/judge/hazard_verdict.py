@@ -84,7 +84,7 @@ def judged_hazard(
         score.cross_track_max_m,
         score.max_overshoot_m,
         score.uncontrolled_s,
-        tuple(own),
+        tuple(fault for fault in own if fault.kind not in expected.tolerates),
     )
 
 

@@ -47,6 +47,16 @@ def test_where_the_daemon_is_dead_it_is_counted_from_its_death() -> None:
     assert "down_late" in {fault.kind for fault in found.faults}
 
 
+def test_what_a_scenario_tolerates_is_no_fault_of_the_answer_either() -> None:
+    (row,) = (row for row in HAZARDS if row.name == "attitude_wrong")
+    flight = evidence(landed(*(at(second * S) for second in range(1, 31))), [status(0), status(31 * S)])
+    told = score(flight)
+    for tolerates, kinds in (((), {"not_found", "other_action"}), (("not_found", "other_action"), set())):
+        expected = Expectation(hazard=row.name, ends="completed", tolerates=tolerates)
+        found = judged_hazard(row, expected, flight, told, [], [10 * S])
+        assert {fault.kind for fault in found.faults} - {"other_end"} == kinds
+
+
 FLOWN = [at(second * S) for second in range(1, 31)]
 ENDS: dict[str, tuple[Phase, list[Kinematics]]] = {
     "completed": (Phase.DONE, landed(*FLOWN)),
