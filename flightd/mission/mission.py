@@ -41,8 +41,7 @@ from flightd.mission.plan.flight_plan import FlightPlan, HeadingPolicy, Stop
 from flightd.mission.plan.itinerary import Itinerary
 from flightd.mission.plan_in_hand import PlanInHand
 from flightd.mission.reasons import Happened, Reason, in_words
-from flightd.mission.safety.hazard_monitor import FlightContext, HazardMonitor
-from flightd.mission.safety.hazard_table import Action, triggers_of
+from flightd.mission.safety.hazard_monitor import TAKEN_OVER, FlightContext, HazardMonitor
 from flightd.mission.safety.loss_actions import LossActions
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.shelf_scan import ShelfScan
@@ -305,7 +304,7 @@ class Mission:
             found.discard(Trigger.LINES_FOUND)
         if Trigger.DISARMED in found and self.state.on_pad:
             found |= self._landed()
-        return found - triggers_of(Action.HANDS_OFF) if self._progress.adopting(s, self.phase) else found
+        return found - TAKEN_OVER if self._progress.adopting(s, self.phase) else found
 
     def _heed_battery(self, s: MissionInputs) -> set[Trigger]:
         """Turn back, or end a pause on the way back, when the charge asks for it; land when it is spent."""

@@ -33,6 +33,8 @@ _OFF_FLOOR_M = 0.5
 _RISES_UNSEEING_M, _RISES_UNSEEING_SHARE = 1.0, 0.65
 """So high, or so far up to its flying height, goes a take-off that sees no line of the map: nothing steers
 it, and it drifts by the square of the time."""
+TAKEN_OVER = triggers_of(Action.HANDS_OFF)
+"""Somebody else has the vehicle."""
 _SWINGS_LAND_S = 12.0
 """A drone that swings about its place, and does nothing worse, is held for so long: its loop has been slowed
 down, and corridor and push are judged by themselves."""
