@@ -22,6 +22,7 @@ _TOGETHER = {
     "tests/replay/test_report.py",
     "tests/replay/test_report_inventory.py",
     "tests/sim/flights/test_scan_flight.py",
+    "tests/sim/flights/test_stream_flight.py",
     "tests/sim/ground/test_ground_lost.py",
     "tests/sim/ideal/test_height_changes.py",
     "tests/sim/ideal/test_ideal_sweep.py",
@@ -36,7 +37,7 @@ _TOGETHER = {
     "tests/web/test_flights_api.py",
     "tests/web/test_studio_api.py",
 }
-"""Modules whose tests share what took long to make."""
+"""Modules whose tests share what took long to make, or each need more than a core for themselves."""
 _ON_ONE_DATABASE = "tests/unit/ground_store/"
 _IN_BROWSER = re.compile(r"tests/web/test_(?:\w*page|language|navigation)\.py")
 """Each starts a Chromium, and a station for all its tests."""
