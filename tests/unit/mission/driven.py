@@ -134,7 +134,7 @@ class Flight:
     def land(self) -> Phase:
         """It comes down and stands disarmed; what became of it."""
         self.to(Phase.LAND, 120.0)
-        self.set(landed=LandedState.ON_GROUND, armed=False)
+        self.set(landed=LandedState.ON_GROUND, armed=False, height_m=0.1)
         self.run(0.02, follow=False)
         return self.phase
 

@@ -173,7 +173,7 @@ def land_to_swap(flight: Flight) -> None:
     flight.to(Phase.FOLLOW)
     turn(flight, Intent.RETURN)
     flight.to(Phase.LAND)
-    flight.set(landed=LandedState.ON_GROUND, armed=False)
+    flight.set(landed=LandedState.ON_GROUND, armed=False, height_m=0.1)
     flight.run(0.02, follow=False)
 
 

@@ -34,6 +34,10 @@ def test_an_interrupt_meanwhile_comes_when_the_start_is_done() -> None:
             signal.raise_signal(signal.SIGINT)
             done = True
 
-    with pytest.raises(KeyboardInterrupt):
-        start()
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start()
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert done
