@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from flightd.core.tracks import SensorEstimate
 
-DELAY_UNSEEN_S = 0.002
+_DELAY_UNSEEN_S = 0.002
 """What the shake of frames makes of their delay, and no row tells: usual flights err to one side by it."""
 
 
@@ -46,10 +46,10 @@ class LearntSensors:
         """Standard deviation."""
         return math.sqrt(max(self.covariance[what * (len(Learnt) + 1)], 0.0))
 
-    @property
-    def delay_sigma_s(self) -> float:
-        """How well the delay of the frames is known: beside the filter's own doubt, by what it cannot see."""
-        return math.hypot(self.sigma(Learnt.DELAY), DELAY_UNSEEN_S)
+
+def whole_delay_sigma_s(sigma_s: float) -> float:
+    """How well the delay of the frames is known: by the filter's own doubt and by what it cannot see."""
+    return math.hypot(sigma_s, _DELAY_UNSEEN_S)
 
 
 def estimate_of(learnt: LearntSensors, shake_rad: float = math.nan) -> SensorEstimate:
@@ -57,7 +57,7 @@ def estimate_of(learnt: LearntSensors, shake_rad: float = math.nan) -> SensorEst
     mean, sigma = learnt.mean, learnt.sigma
     return SensorEstimate(
         delay_s=mean(Learnt.DELAY),
-        delay_sigma_s=learnt.delay_sigma_s,
+        delay_sigma_s=whole_delay_sigma_s(sigma(Learnt.DELAY)),
         mount_roll_rad=mean(Learnt.MOUNT_ROLL),
         mount_pitch_rad=mean(Learnt.MOUNT_PITCH),
         mount_sigma_rad=max(sigma(Learnt.MOUNT_ROLL), sigma(Learnt.MOUNT_PITCH)),

@@ -17,6 +17,7 @@ from flightd.sim.appearance import HARSH, Appearance
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.floor.misplaced_lines import misplaced
 from flightd.sim.floor.paint_damage import PaintDamage, drawn_damage
+from flightd.sim.leap import NEVER, Leap
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wash import Wash
@@ -39,7 +40,7 @@ class WorldKind(enum.StrEnum):
 
 _SENSORS = SensorParams()
 _GUST_RMS_MPS = WindParams().gust_rms_mps
-_LEAPS_AT_S = 35.0, 60.0
+_LEAPS_AFTER_S = 35.0, 60.0
 """When delays and clocks leap: what the flight knew twenty seconds after its take-off is judged by then."""
 
 
@@ -50,10 +51,8 @@ class Unknowns:
     kind: WorldKind = WorldKind.IDEAL
     camera_delay_s: float = 0.0
     camera_jitter_s: float = 0.0
-    camera_leap_s: float = 0.0
-    """By so much pictures come later from `camera_leap_at_s` on: a frame more is queued, or one less."""
-    camera_leap_at_s: float = math.inf
-    """Since the camera took its first one."""
+    camera_leap: Leap = NEVER
+    """Pictures come later from so long after the first on: a frame more is queued, or one less."""
     mount_roll_rad: float = 0.0
     mount_pitch_rad: float = 0.0
     mount_yaw_rad: float = 0.0
@@ -74,9 +73,8 @@ class Unknowns:
     leak_s: float | None = None
     """Time within which the told attitude leaks towards level; None: it does not."""
     clock_ppm: float = 20.0
-    clock_leap_s: float = 0.0
-    """By so much the autopilot's clock is set from `clock_leap_at_s` after its boot on."""
-    clock_leap_at_s: float = math.inf
+    clock_leap: Leap = NEVER
+    """The autopilot's clock is set, so long after its boot."""
     path_s: tuple[float, float] = (0.0, 0.0)
     """Least delay of telemetry, and of what is sent to the autopilot."""
     path_jitter_s: float = 0.0
@@ -351,13 +349,15 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
 
+    def leap(by_s: float) -> Leap:
+        return Leap(by_s, leaps.uniform(*_LEAPS_AFTER_S)) if by_s else NEVER
+
     uneven_s, delay_s = within(most.uneven_s), within(most.delay_s)
     return Unknowns(
         kind=kind,
         camera_delay_s=delay_s,
         camera_jitter_s=most.jitter_s,
-        camera_leap_s=math.copysign(most.delay_leap_s, -delay_s),
-        camera_leap_at_s=leaps.uniform(*_LEAPS_AT_S) if most.delay_leap_s else math.inf,
+        camera_leap=leap(math.copysign(most.delay_leap_s, -delay_s)),
         mount_roll_rad=math.radians(within(most.mount_deg)),
         mount_pitch_rad=math.radians(within(most.mount_deg)),
         mount_yaw_rad=math.radians(within(most.mount_yaw_deg)),
@@ -368,8 +368,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         tilt_wander_rad=math.radians(most.tilt_wander_deg),
         leak_s=most.leak_s,
         clock_ppm=within(most.clock_ppm),
-        clock_leap_s=leaps.choice((-1.0, 1.0)) * most.clock_leap_s,
-        clock_leap_at_s=leaps.uniform(*_LEAPS_AT_S) if most.clock_leap_s else math.inf,
+        clock_leap=leap(leaps.choice((-1.0, 1.0)) * most.clock_leap_s),
         path_s=(most.path_s + uneven_s, most.path_s - uneven_s),
         path_jitter_s=most.path_jitter_s,
         range_noise_m=most.range_noise_m,

@@ -248,8 +248,7 @@ def _autopilot(spec: WorldSpec, airframe: Airframe, goods: Sequence[Goods], cloc
         radio_up=up,
         parameters=parameters,
         clock_ppm=spec.clock_ppm,
-        clock_leap_s=spec.unknowns.clock_leap_s,
-        clock_leap_at_s=spec.unknowns.clock_leap_at_s,
+        clock_leap=spec.unknowns.clock_leap,
         sensors=spec.unknowns.sensors(SensorParams(range_min_m=spec.range_least_m, goods=goods)),
         second_range_m=spec.second_range_m,
     )
@@ -272,7 +271,7 @@ def _down_camera(
         make = partial(CheapCamera, make, camera, spec.cheap, spec.seed)
     seed, address = f"camera {spec.seed}", spec.camera_address
     shaken = Shaken(spec.unknowns.shake_rad, spec.seed)
-    leap = spec.unknowns.camera_leap_s, spec.unknowns.camera_leap_at_s
+    leap = spec.unknowns.camera_leap
     return CameraPeer(
         camera,
         make,

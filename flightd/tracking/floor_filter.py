@@ -19,7 +19,7 @@ import numpy as np
 
 from flightd.config.tracking import MotionNoise, SensorPriors
 from flightd.core.geometry import Matrix
-from flightd.core.learnt import DELAY_UNSEEN_S, LearntSensors, estimate_of
+from flightd.core.learnt import LearntSensors, estimate_of, whole_delay_sigma_s
 from flightd.core.tracks import SensorEstimate
 from flightd.tracking.first_doubt import LEAST_HEIGHT_SHARE, drift_of, first_sigmas
 from flightd.tracking.forgotten_lines import FEATURE_NS, forgotten_features, forgotten_lines
@@ -119,8 +119,8 @@ class FloorFilter:
 
     @property
     def delay_sigma_s(self) -> float:
-        """How well the delay of the frames is known: beside the filter's own doubt, by what it cannot see."""
-        return math.hypot(self.sigma(DELAY), DELAY_UNSEEN_S)
+        """How well the delay of the frames is known."""
+        return whole_delay_sigma_s(self.sigma(DELAY))
 
     def without_errors(self) -> Matrix:
         """The first states, were the told attitude right."""

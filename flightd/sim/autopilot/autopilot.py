@@ -20,6 +20,7 @@ from flightd.sim.autopilot.parameters import ParameterServer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.autopilot.streams import HEARTBEAT_ID, MessageStreams, whole
 from flightd.sim.autopilot.telemetry import Instruments
+from flightd.sim.leap import NEVER, Leap
 from flightd.sim.plant.airframe import Airframe, AirframeCommand
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.truth_history import TruthHistory
@@ -51,7 +52,7 @@ class PeerConfig:
 
     `remotes` are addresses it talks to unasked (a companion that only listens).  `ready_s` after boot
     it can be armed (a real one takes about 20 s).  Its boot clock runs `clock_ppm` fast, and
-    is set by `clock_leap_s` once it is `clock_leap_at_s` old.
+    is set once by `clock_leap`.
     It has no estimate of its position unless `has_position`, and stands at `place_deg` on earth (latitude
     and longitude).  `radio` lies between it and the companion,
     `radio_up` on the way to it where that is another.
@@ -66,8 +67,7 @@ class PeerConfig:
     place_deg: tuple[float, float] = (51.4778, 0.0)
     step_ns: int = 2_500_000
     clock_ppm: float = 20.0
-    clock_leap_s: float = 0.0
-    clock_leap_at_s: float = math.inf
+    clock_leap: Leap = NEVER
     sensors: SensorParams = field(default_factory=SensorParams)
     seed: int = 0
     home_leap_m: float = 1.4
@@ -124,7 +124,7 @@ class AutopilotPeer(abc.ABC):
         self._clock = clock
         self._now_ns = self._boot_ns = clock.now_ns()
         self._clock_ppm = config.clock_ppm
-        self._leap_ns, self._leaps_ns = round(config.clock_leap_s * 1e9), config.clock_leap_at_s * 1e9
+        self._clock_leap = config.clock_leap
         self.streams = MessageStreams(self.link, self, self._now_ns, config.step_ns)
         self._steps = 0
         self._truth = TruthHistory(_TRUTH_SAMPLES)
@@ -370,8 +370,7 @@ class AutopilotPeer(abc.ABC):
     def boot_clock_ns(self, now_ns: int) -> int:
         """The time since boot by the autopilot's own clock."""
         elapsed_ns = now_ns - self._boot_ns
-        leapt_ns = self._leap_ns if elapsed_ns > self._leaps_ns else 0
-        return elapsed_ns + round(elapsed_ns * self._clock_ppm * 1e-6) + leapt_ns
+        return elapsed_ns + round(elapsed_ns * self._clock_ppm * 1e-6) + self._clock_leap.ns(elapsed_ns)
 
     def _refresh(self, now_ns: int) -> None:
         self.instruments.boot_ms = self.boot_clock_ns(now_ns) // _NS_PER_MS % _BOOT_WRAP_MS

@@ -27,6 +27,7 @@ from flightd.runtime.child_process import Child
 from flightd.runtime.clock import Hold
 from flightd.runtime.frame_notice import FrameNotice, decode_request, encode_notice
 from flightd.runtime.frame_ring import FrameRing
+from flightd.sim.leap import NEVER, Leap
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import USUALLY, Taking
 
@@ -124,10 +125,10 @@ class CameraPeer:
     `address`; or, with `show`, hands the pictures themselves to a vehicle that transmits them.
 
     `make` is called in the rendering process (it must be picklable); `seed` draws the delivery's jitter.
-    While `wanted` says no, no picture is taken; `lamp` is that of `PictureMaker`; by `leap[0]` all
-    pictures come later from `leap[1]` (s) after the first on.  Time is held by `hold`
-    while one is being drawn.  A renderer that fails ends it with a RunError that has the camera's `name`: a
-    flight that goes on blind for a fault of its world tells nothing."""
+    While `wanted` says no, no picture is taken; `lamp` is that of `PictureMaker`; after the `leap` all
+    pictures come later.  Time is held by `hold` while one is being drawn.  A renderer that fails ends it with
+    a RunError that has the camera's `name`: a flight that goes on blind for a fault of its world tells
+    nothing."""
 
     def __init__(
         self,
@@ -142,7 +143,7 @@ class CameraPeer:
         hold: Hold = contextlib.nullcontext,
         name: str = "camera",
         lamp: Callable[[], float] = float,
-        leap: tuple[float, float] = (0.0, math.inf),
+        leap: Leap = NEVER,
     ) -> None:
         self._name, self._leap = name, leap
         self._lamp = lamp
@@ -191,7 +192,6 @@ class CameraPeer:
     async def _expose(self, child: Child, transport: Any, pictures: asyncio.TaskGroup) -> None:
         """Take a picture each period; each is rendered and delivered by a task of its own."""
         period_ns = self._period_ns
-        leap_s, leap_at_s = self._leap
         exposure_ns = began_ns = self._clock.now_ns()
         seq = 0
         while True:
@@ -209,8 +209,7 @@ class CameraPeer:
                 truth = self._truth_at(exposure_ns)
                 straggles = seq % self.trouble.straggler_every == 0
                 late_s = self.trouble.late_s + (self.trouble.straggler_s if straggles else 0.0)
-                late_s += leap_s if (exposure_ns - began_ns) * 1e-9 > leap_at_s else 0.0
-                due_ns += round(late_s * 1e9)
+                due_ns += round(late_s * 1e9) + self._leap.ns(exposure_ns - began_ns)
                 how = replace(self._how, lamp=self._lamp())
                 pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, how))
             seq += 1

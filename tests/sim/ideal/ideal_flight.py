@@ -165,7 +165,7 @@ class IdealFlight:
         self._eye = IdealEye(world, camera.lens, camera.mount, errors, seed)
         self._shaken = Shaken(unknown.shake_rad, seed)
         self._camera_off_ns = round(unknown.camera_delay_s * 1e9)
-        self._leap_ns, self._leaps_ns = round(unknown.camera_leap_s * 1e9), unknown.camera_leap_at_s * 1e9
+        self._camera_leap = unknown.camera_leap
         self._jitter_s, self._jitter = unknown.camera_jitter_s, random.Random(f"jitter {seed}")
         self._climb = ClimbLoop(ClimbGains(hover_guess=frame.hover_collective))
         self._delay_ns = delay_ns
@@ -325,7 +325,7 @@ class IdealFlight:
 
     @property
     def _off_ns(self) -> int:
-        leapt_ns = self._leap_ns if self._now_ns - self._began_ns > self._leaps_ns else 0
+        leapt_ns = self._camera_leap.ns(self._now_ns - self._began_ns)
         return self._camera_off_ns + self.faults.delay_ns + leapt_ns
 
     def _see(self, seq: int) -> LineSet:

@@ -58,7 +58,7 @@ class IdealLink:
         self._down: Line[Any] = Line(down, f"down {seed}")
         self._up: Line[Any] = Line(up, f"up {seed}")
         self._boot_ns, self._ppm = now_ns - _BOOT_NS, unknowns.clock_ppm
-        self._leap_ns, self._leaps_ns = round(unknowns.clock_leap_s * 1e9), unknowns.clock_leap_at_s * 1e9
+        self._leap = unknowns.clock_leap
         self._airframe = airframe
         self._instruments = Instruments(airframe, sensors)
         self._due_ns = dict.fromkeys(RATES_HZ, now_ns)
@@ -99,8 +99,7 @@ class IdealLink:
 
     def _theirs_ns(self, now_ns: int) -> int:
         since_ns = now_ns - self._boot_ns
-        leapt_ns = self._leap_ns if since_ns > self._leaps_ns else 0
-        return since_ns + round(since_ns * self._ppm * 1e-6) + leapt_ns
+        return since_ns + round(since_ns * self._ppm * 1e-6) + self._leap.ns(since_ns)
 
     def _talk(self, now_ns: int, setpoint: AttitudeSetpoint | None) -> None:
         if setpoint is not None and setpoint is not self._sent:

@@ -46,11 +46,11 @@ def test_what_is_drawn_stays_within_its_world_and_reaches_what_it_is_of(kind: Wo
         assert most.least_flicker <= one.flicker <= most.most_flicker
         assert 0.0 <= one.sensors(SensorParams()).compass_rad <= math.radians(most.compass_deg)
         if most.delay_leap_s:
-            assert abs(one.camera_delay_s + one.camera_leap_s) <= most.delay_s
-            assert 30.0 < one.camera_leap_at_s < 70.0
-            assert abs(one.clock_leap_s) == most.clock_leap_s
+            assert abs(one.camera_delay_s + one.camera_leap.by_s) <= most.delay_s
+            assert 30.0 < one.camera_leap.after_s < 70.0
+            assert abs(one.clock_leap.by_s) == most.clock_leap_s
         else:
-            assert one.camera_leap_s == one.clock_leap_s == 0.0
+            assert one.camera_leap.by_s == one.clock_leap.by_s == 0.0
         down_s, up_s = one.path_s
         assert down_s + up_s == pytest.approx(2.0 * most.path_s)
 
