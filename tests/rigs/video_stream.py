@@ -48,7 +48,9 @@ def send(url: str, form: str, codec: str, rate_hz: float) -> None:
     video.width, video.height = WIDTH_PX, HEIGHT_PX
     video.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
     if codec == "mjpeg":
-        video.options = {"huffman": "default"}  # RTP carries no others
+        # RTP carries no other tables, nor the restart markers between slices of several threads
+        video.options = {"huffman": "default"}
+        video.thread_count = 1
     else:
         video.options = {"tune": "zerolatency", "preset": "ultrafast", "g": str(round(rate_hz / 2))}
     video.codec_context.time_base = _MICROSECONDS
