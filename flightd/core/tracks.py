@@ -154,3 +154,5 @@ class TrackSet:
     features_ns: tuple[int, int] = (0, 0)
     """Capture time of the newest frame in which features of the floor, and no line, told the motion along
     x, and along y."""
+    velocity_sigma_mps: tuple[float, float] = (0.15, 0.15)
+    """Of vx, and of vy."""

@@ -10,8 +10,9 @@ wrong (a slip while no line is seen, a carried drone) leaks a little weight to t
 at each new node, much more after a gap without lines, so that no belief is ever beyond doubt.
 
 Likelihoods (`localisation.observation_model`).  Each observation counts once: a line seen where the map has
-one, or none; a painted line that passed below and was not seen; the arms of a crossing (cross, tee, corner);
-the end of a line, seen or not where it should be; a pad's mat; a floor marker or a shelf label of known
+one, or none; how far it goes on; a painted line that passed below and was not seen; the arms of a crossing
+(cross, tee, corner); the end of a line, seen or not where it should be; a pad's mat; a floor marker or a
+shelf label of known place.  How much each says depends on how worn the floor is, which is learnt with the
 place.
 
 `GridPose.integrity` is the posterior probability that the node told is the right one.  The recursion is
@@ -31,6 +32,7 @@ from flightd.core.tracks import TrackedLine, TrackSet
 from flightd.core.types import GridPose
 from flightd.localisation.hypotheses import Places
 from flightd.localisation.junction_landmarks import Landmark, LandmarkBook
+from flightd.localisation.line_runs import LineRuns
 from flightd.localisation.observation_model import (
     SensorModel,
     crossing_likelihood,
@@ -53,12 +55,16 @@ _JUDGE_NS = 100_000_000
 """What was passed and what is left to match is looked at so often."""
 _SWITCH = 1.5
 """Another place is believed when it is so much likelier."""
+_BESIDE_M = 0.3
+"""Lines so close are taken for each other."""
+_BELOW = 0.3
+"""Part of the height within which a line is below the drone."""
 _SEEN_NS = 200_000_000
 """A line seen so lately counts as in view."""
 _CARRIED_NS = 400_000_000
 """So lately features of the floor must have been followed to carry a position on."""
 _SURE = 0.99
-"""A place this likely says which line of the map a track is."""
+"""Places this likely together say how far a line of the map is."""
 _CREEP_MPS = 0.1
 """A hover counts as so fast: what carries a position drifts at rest, too."""
 _GAP_S = 0.6
@@ -85,9 +91,11 @@ class GridLocaliser:
         self._model = model or SensorModel()
         self._paint = PaintMap.of(site)
         self._nodes = NodeIndex(site)
-        self._places = Places(self._paint, self._model)
+        self._places = Places(self._paint, self._model, self._params.elsewhere)
         self._marks = LandmarkBook()
         self._fixes = FixBook(site)
+        self._passed: list[set[int]] = [set(), set()]
+        self._runs = LineRuns(), LineRuns()
         self._judged: tuple[list[float], list[float]] = ([], [])
         self._seen_ns = [0, 0]
         self._told_ns = [0, 0]
@@ -125,15 +133,14 @@ class GridLocaliser:
         return sorted(((n, w) for n, w in by_node.items() if w >= least), key=lambda item: -item[1])
 
     def map_lines(self, axis: int) -> dict[int, float]:
-        """Where on the map (m, across the axis) each track is that is surely a line of it; none while the
-        place is in doubt."""
+        """Where on the map (m, across the axis) each track is that is surely a line of it, seen from the
+        likeliest place: wherever else the drone may be, the line there lies as far from it.  Lines that were
+        below the drone: had there been another one beside it, it would have been seen."""
         places = self._places
-        if places.weights[places.best] < _SURE:
-            return {}
         return {
             track: float(self._paint.axes[axis].at_m[line])
             for track, line in places.lines(axis).items()
-            if line >= 0
+            if line >= 0 and track in self._passed[axis] and places.agreed(axis, track) > _SURE
         }
 
     def way_out(self, least: float = 1e-3) -> tuple[float, float] | None:
@@ -158,10 +165,15 @@ class GridLocaliser:
         for axis, velocity in ((0, tracks.vx_mps), (1, tracks.vy_mps)):
             lines = tracks.across_y if axis else tracks.across_x
             carried = now_ns - tracks.features_ns[axis] < _CARRIED_NS
-            places.move(axis, velocity, dt_s, carried=carried)
+            places.move(axis, velocity, tracks.velocity_sigma_mps[axis], dt_s, carried=carried)
             self._match(axis, lines, reach_m, due)
-            places.settle(axis, lines, now_ns, tracks.features_ns[axis])
+            places.settle(axis, lines)
             self._carry(axis, tracks, dt_s)
+            self._passed[axis] = {
+                line.id
+                for line in lines
+                if line.id in self._passed[axis] or abs(line.offset_m) < _BELOW * height_m
+            }
         if tracks.junctions_ns > self._junctions_ns:
             self._junctions_ns = tracks.junctions_ns
             self._see(tracks, height_m)
@@ -208,13 +220,14 @@ class GridLocaliser:
             if other.id != node
         ]
         odds = [params.carried / (1.0 + (apart_m / params.carried_m) ** 2) for _, apart_m in others]
-        self._places.weights[0] = params.elsewhere
         at_m = [(n.x_m, n.y_m) for n in (here, *(other for other, _ in others))]
         self._places.add(at_m, [1.0, *odds], params.start_sigma_m)
         self._places.best = 1
 
     def _match(self, axis: int, tracks: Sequence[TrackedLine], reach_m: float, due: bool) -> None:
         places, judged = self._places, self._judged[axis]
+        newest_ns = max((track.seen_ns for track in tracks), default=0)
+        in_view = {track.id for track in tracks if newest_ns - track.seen_ns < _SEEN_NS}
         for track in sorted(tracks, key=lambda t: -t.seen_ns):
             if track.hits < _MIN_HITS:
                 continue
@@ -225,11 +238,19 @@ class GridLocaliser:
                 judge = all(abs(at_m - other) > 0.15 for other in judged)
                 if judge:
                     judged.append(at_m)
-                places.match(axis, track, reach_m, judge)
+                places.match(axis, track, in_view, reach_m, judge)
+                for other in tracks:
+                    apart_m = abs(other.offset_m - track.offset_m)
+                    if (
+                        other.id in in_view - {track.id}
+                        and apart_m < _BESIDE_M
+                        and places.knows(axis, other.id)
+                    ):
+                        places.contest(axis, track, other)
                 index = places.matched(axis, track.id)
             else:
                 if due and places.unmatched(axis, track.id):
-                    places.match(axis, track, reach_m, judge=False)
+                    places.match(axis, track, in_view, reach_m, judge=False)
             if index[places.best] >= 0:
                 self._ever_matched[axis] = True
                 self._seen_ns[axis] = max(self._seen_ns[axis], track.seen_ns)
@@ -271,6 +292,11 @@ class GridLocaliser:
             for axis in (0, 1):
                 places.weigh(places.pass_by(axis, view_m[axis], leave_m, params.due_s, dt_s))
             here = places.at_m[places.best]
+            for axis, lines in enumerate((tracks.across_x, tracks.across_y)):
+                grown_m = self._runs[axis].grown_m(lines, float(here[1 - axis]), tracks.stamp_ns)
+                for track, more_m in grown_m.items():
+                    if places.knows(axis, track):
+                        places.goes_on(axis, track, more_m)
             ends = [(m.x_m, m.y_m) for m in self._marks.marks if m.arms.bit_count() == 1]
             seen = np.array(ends, dtype=float).reshape(-1, 2) - here
             places.weigh(places.pass_ends(seen, min(view_m), leave_m, 2 * params.due_s, dt_s))
@@ -319,7 +345,7 @@ class GridLocaliser:
             (float(here[0]) + nodes[other].x_m - node.x_m, float(here[1]) + nodes[other].y_m - node.y_m)
             for other in self._site.neighbours(self._node)
         ]
-        places.weights[0] += self._params.elsewhere
+        places.doubt(self._params.elsewhere)
         places.add(at_m, [weight] * len(at_m), max(0.05, float(places.sigma_m[places.best].max())))
 
     def _fix(self, x_m: float, y_m: float, sigma_m: float) -> None:

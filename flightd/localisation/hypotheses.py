@@ -3,12 +3,14 @@
 A place is one discrete hypothesis ("I am where I think", "one node further along x", ...).  All move by
 the same odometry, but each matches the tracked lines to the map by itself and takes its position from
 its own matches, so that none drifts.  Row 0 stands for everywhere else: it matches nothing and never
-moves into the map.  Arrays have N rows, one for each place.
+moves into the map.  Arrays have N rows, one for each place.  Weights are held jointly with the C states that
+the floor may be in: one floor lies below all places, but each makes another of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -18,33 +20,41 @@ from flightd.localisation.observation_model import Flags, Indices, SensorModel, 
 from flightd.site.painted_lines import AxisLines, PaintMap
 
 _FAR_M = 1e7
-_DRIFT_MPS, _CARRIED_MPS, _CARRIED_SHARE = 0.15, 0.03, 0.04
-"""Growth of a position's sigma while no line is seen, and while features of the floor tell the motion, to
-which a wrong height adds its share."""
+_CARRIED_MPS, _CARRIED_SHARE = 0.03, 0.04
+"""Least growth of a position's sigma while features of the floor tell the motion: what they err by stays, and
+a wrong height adds its share."""
 _RIVAL = 0.01
 """Another map line is considered too where it explains the track so well, against the nearest one."""
 _MATCH_SIGMAS = 4.0
 _MATCH_SLACK_M = 0.06
 _SURVEY_SIGMA_M = 0.01
-_FRESH_S = 0.3
-"""A line seen so recently counts as seen: pictures come late and now and then without a line."""
+_DOUBT_SIGMAS, _DOUBT_M = 2.0, 0.08
+"""A match that moves a place by more, of both, or by `_SAME_M` is in doubt, and so is any where the place is
+not known better than that."""
 _SAME_M = 0.2
-"""Places closer than this in both axes are one."""
-_NEGLIGIBLE = 1e-7
+_LEAST_M = 0.05
+"""Places are one that are closer than either is known in both axes, but at least so close and not further
+apart than `_SAME_M`, once no line in view is another one there."""
+_NEGLIGIBLE, _TINY = 1e-7, 1e-300
+_ALIKE_M = 0.05
 _UNMATCHED, _FALSE = -1, -2
 """Instead of a map line: none fits yet, or this place holds the track to be no line of the map."""
 
 
 class Places:
-    """A discrete probability over places; `weights` sum to 1."""
+    """A discrete probability over places and states of the floor, which sums to 1."""
 
-    def __init__(self, paint: PaintMap, model: SensorModel) -> None:
+    def __init__(self, paint: PaintMap, model: SensorModel, elsewhere: float) -> None:
+        """None is thought of yet, and `elsewhere` is the weight of that they all are wrong against those
+        that are `add`ed first."""
         self._paint = paint
         self._model = model
         self.at_m: Matrix = np.full((1, 2), _FAR_M)
         self.sigma_m: Matrix = np.ones((1, 2))
-        self.weights: Matrix = np.ones(1)
+        self._joint: Matrix = elsewhere * model.floor_prior[None, :]
         self._matches: tuple[dict[int, Indices], dict[int, Indices]] = ({}, {})
+        self._found: tuple[dict[int, Matrix], dict[int, Matrix]] = ({}, {})
+        """(N, 2) how far from each track its line was expected when it was matched, and sigma of that."""
         self._known: list[Flags] = [np.zeros((1, len(a.at_m)), dtype=bool) for a in paint.axes]
         self._missed: list[Flags] = [np.zeros((1, len(a.at_m)), dtype=bool) for a in paint.axes]
         self._dwell_s: list[Matrix] = [np.zeros((1, len(a.at_m))) for a in paint.axes]
@@ -53,15 +63,38 @@ class Places:
         self.best = 0
 
     def __len__(self) -> int:
-        return len(self.weights)
+        return len(self._joint)
+
+    @property
+    def weights(self) -> Matrix:
+        """(N) the probability of each place."""
+        weights: Matrix = self._joint.sum(axis=1)
+        return weights
+
+    @property
+    def floor(self) -> Matrix:
+        """(C) the probability of each state of the floor where the likeliest place is the true one."""
+        here: Matrix = self._joint[self.best]
+        return here / max(float(here.sum()), _TINY)
 
     def matched(self, axis: int, track_id: int) -> Indices:
         """(N) indices of the map lines that the track is, negative where it is none."""
         return self._matches[axis][track_id]
 
+    def knows(self, axis: int, track_id: int) -> bool:
+        """Whether the track was given to `match`."""
+        return track_id in self._matches[axis]
+
     def lines(self, axis: int) -> dict[int, int]:
         """The map line of each track at the likeliest place, negative where it is none."""
         return {track: int(index[self.best]) for track, index in self._matches[axis].items()}
+
+    def agreed(self, axis: int, track_id: int) -> float:
+        """How likely the track is a map line as far from the drone as at the likeliest place."""
+        index = self._matches[axis][track_id]
+        off_m = self._paint.axes[axis].at_m[index] - self.at_m[:, axis]
+        agree = (index >= 0) & (np.abs(off_m - off_m[self.best]) < _ALIKE_M)
+        return float(self.weights[agree].sum())
 
     def unmatched(self, axis: int, track_id: int) -> bool:
         """Whether at some place the track may still turn out to be a map line."""
@@ -77,20 +110,21 @@ class Places:
 
     # Motion
 
-    def move(self, axis: int, velocity_mps: float, dt_s: float, *, carried: bool = False) -> None:
-        """Carry all places on by the odometry, which is better while features of the floor have `carried`
-        it."""
+    def move(
+        self, axis: int, velocity_mps: float, sigma_mps: float, dt_s: float, *, carried: bool = False
+    ) -> None:
+        """Carry all places on by the odometry.  Its error lasts (a wind, a lean that is told wrong), so
+        sigmas add up; while features of the floor have `carried` it, no better than those are."""
         self.at_m[1:, axis] += velocity_mps * dt_s
-        carried_mps = _CARRIED_MPS + _CARRIED_SHARE * abs(velocity_mps)
-        self.sigma_m[:, axis] += (carried_mps if carried else _DRIFT_MPS) * dt_s
+        least_mps = _CARRIED_MPS + _CARRIED_SHARE * abs(velocity_mps) if carried else 0.0
+        self.sigma_m[:, axis] += max(sigma_mps, least_mps) * dt_s
 
-    def settle(self, axis: int, tracks: Sequence[TrackedLine], now_ns: int, carried_ns: int = 0) -> None:
-        """Take each place's position from the lines that it has matched; forget tracks that are gone.  Until
-        `carried_ns` features of the floor have told where lines out of sight are."""
+    def settle(self, axis: int, tracks: Sequence[TrackedLine]) -> None:
+        """Take each place's position from the lines that it has matched; forget tracks that are gone."""
         held = {track.id: track for track in tracks}
         matches = self._matches[axis]
         for gone in [id_ for id_ in matches if id_ not in held]:
-            del matches[gone]
+            del matches[gone], self._found[axis][gone]
         if not matches:
             return
         lines = self._paint.axes[axis].at_m
@@ -98,9 +132,7 @@ class Places:
         total: Matrix = np.zeros(len(self))
         for id_, index in matches.items():
             track = held[id_]
-            told_ns = max(track.seen_ns, carried_ns)
-            unseen_m = _DRIFT_MPS * max((now_ns - told_ns) * 1e-9 - _FRESH_S, 0.0)
-            told = 1.0 / (track.sigma_m**2 + _SURVEY_SIGMA_M**2 + unseen_m**2)
+            told = 1.0 / (track.sigma_m**2 + _SURVEY_SIGMA_M**2)
             share = np.where(index >= 0, told, 0.0)
             weight += share
             total += share * (lines[index] - track.offset_m)
@@ -112,18 +144,27 @@ class Places:
     # Evidence
 
     def weigh(self, factors: Matrix) -> None:
-        """Bayes: multiply the likelihoods in and normalise."""
-        self.weights = self.weights * factors
-        self.weights /= self.weights.sum()
+        """Bayes: multiply the likelihoods (N, C or 1) in and normalise."""
+        self._joint = self._joint * factors
+        self._joint /= self._joint.sum()
 
-    def match(self, axis: int, track: TrackedLine, reach_m: float, judge: bool) -> None:
-        """Say at each place which painted line the track is; `judge` also weighs the places by it.
+    def doubt(self, weight: float) -> None:
+        """Give elsewhere so much more."""
+        self._joint[0] += weight * self._model.floor_prior
 
-        A match that moves a place by more than `_SAME_M` is in doubt: the line may be a false one, or the
-        next of the map.  Beside the place that is moved to the nearest line one is kept for either."""
+    def match(
+        self, axis: int, track: TrackedLine, beside: Collection[int], reach_m: float, judge: bool
+    ) -> None:
+        """Say at each place which painted line the track is; `judge` also weighs the places by it.  What the
+        tracks `beside` it, in view now, are it is not.
+
+        A match of a place that is badly known, or that moves it further than expected, is in doubt: the line
+        may be a false one, beside the true one or instead of it, or another one of the map.  Beside the place
+        that is moved to the nearest line one is kept for each."""
         lines = self._paint.axes[axis]
         matches = self._matches[axis]
         index = matches.setdefault(track.id, np.full(len(self), _UNMATCHED, dtype=np.int64))
+        self._found[axis].setdefault(track.id, np.ones((len(self), 2)))
         if not len(lines.at_m):
             return
         residual = lines.at_m[None, :] - (self.at_m[:, axis, None] + track.offset_m)
@@ -136,50 +177,81 @@ class Places:
         other = np.abs(lines.at_m[None, :] - lines.at_m[best][:, None])
         gate = _MATCH_SIGMAS * sigma + _MATCH_SLACK_M
         taken = np.zeros((len(self), len(lines.at_m)), dtype=bool)
+        seen = taken.copy()
         for id_, already in matches.items():
             if id_ != track.id:
-                taken |= (already >= 0)[:, None] & (lines.at_m[already][:, None] == lines.at_m[None, :])
+                held = (already >= 0)[:, None] & (lines.at_m[already][:, None] == lines.at_m[None, :])
+                taken |= held
+                if id_ in beside:
+                    seen |= held
         new = (index == _UNMATCHED) & (found <= gate) & ~taken[rows, best]
         if not (judge or new.any()):
             return
-        density = line_density(self._model, residual, sigma, covered)
-        told = density.max(axis=1) + self._model.false_line_per_m
+        model = self._model
+        density = line_density(model, residual, sigma, covered & ~seen)
+        told = model.line_seen * density.max(axis=1)[:, None] + model.false_line_per_m
         if judge:
             again = self._missed[axis][rows, best] & (found < _SAME_M)
-            factors = np.where(again, told / (1.0 - self._model.line_seen), told)
-            factors[0] = self._model.elsewhere_line_per_m
+            factors = np.where(again[:, None], told / (1.0 - model.line_seen), told)
+            factors[0] = model.elsewhere_line_per_m
             self.weigh(factors)
-        moved = np.flatnonzero(new & (found > _SAME_M) & (self.weights > _NEGLIGIBLE))
+        expected = np.clip(_DOUBT_SIGMAS * sigma, _DOUBT_M, _SAME_M)
+        doubted = (found > expected) | (_DOUBT_SIGMAS * sigma > _SAME_M)
+        moved = np.flatnonzero(new & doubted & (self.weights > _NEGLIGIBLE))
         index[new] = best[new]
+        self._found[axis][track.id][new] = np.stack([residual[rows, best], sigma], axis=1)[new]
         self._known[axis][new] |= other[new] <= 1e-6  # every piece of that line
         if not len(moved):
             return
-        rival = np.where(other > 1e-6, density, 0.0)[moved]
-        second = rival.argmax(axis=1)
-        share = rival[np.arange(len(moved)), second] / told[moved]
-        share[taken[moved, second] | (share < _RIVAL)] = 0.0
-        self._branch(axis, track.id, moved, self._model.false_line_per_m / told[moved], second, share)
+        rival = np.where((other > 1e-6) & ~taken, density, 0.0)[moved]
+        share = model.line_seen * rival[:, :, None] / told[moved][:, None, :]
+        share[share.max(axis=2) < _RIVAL] = 0.0
+        self._branch(axis, track.id, moved, model.false_line_per_m / told[moved], share)
 
-    def _branch(
-        self, axis: int, track_id: int, rows: Indices, false: Matrix, second: Indices, rival: Matrix
-    ) -> None:
+    def _branch(self, axis: int, track_id: int, rows: Indices, false: Matrix, rival: Matrix) -> None:
         """Beside each of these places put its like to which the line just matched is none of the map, with
-        the share `false` of its weight, and where `rival` is not 0 one to which it is the line `second`."""
+        the share `false` (M, C) of its weight, and for each line whose share `rival` (M, L, C) is not 0 one
+        to which it is that line."""
         at_m = self._paint.axes[axis].at_m
-        also = np.flatnonzero(rival)
+        also, others = np.nonzero(rival.any(axis=2))
         size, parents = len(self), np.concatenate([rows, rows[also]])
-        shares = np.concatenate([false, rival[also]])
-        lines = np.concatenate([np.full(len(rows), _FALSE), second[also]])
+        shares = np.concatenate([false, rival[also, others]])
+        lines = np.concatenate([np.full(len(rows), _FALSE), others])
         first = self._matches[axis][track_id][parents]
         known = self._known[axis][parents] & (at_m[None, :] != at_m[first][:, None])
         known |= (lines >= 0)[:, None] & (at_m[None, :] == at_m[lines][:, None])
-        weights = self.weights[parents] * shares
-        self.weights[rows] *= 1.0 - false
+        weights = self._joint[parents] * shares
+        self._joint[rows] *= 1.0 - false
         self._take(np.concatenate([np.arange(size), parents]))
-        self.weights[size:] = weights
+        self._joint[size:] = weights
         self._matches[axis][track_id][size:] = lines
         self._known[axis][size:] = known
-        self.weights /= self.weights.sum()
+        self._joint /= self._joint.sum()
+
+    def goes_on(self, axis: int, track_id: int, more_m: float) -> None:
+        """So much more of the track has come into view."""
+        strange = self._matches[axis][track_id] < 0
+        self.weigh(np.where(strange, math.exp(-more_m / self._model.strange_run_m), 1.0)[:, None])
+
+    def contest(self, axis: int, track: TrackedLine, other: TrackedLine) -> None:
+        """Of two lines close beside each other, both in view, one is the map's: where it is `other`, which
+        was seen first, put beside the place its like to which it is the `track`, by how well either was where
+        it was expected then."""
+        matches = self._matches[axis]
+        mine, its = matches[track.id], matches[other.id]
+        rows = np.flatnonzero((mine < 0) & (its >= 0) & (self.weights > _NEGLIGIBLE))
+        if not len(rows):
+            return
+        residual, sigma = self._found[axis][other.id][rows].T
+        residuals = np.stack([residual, residual + other.offset_m - track.offset_m], axis=1)
+        told = line_density(self._model, residuals, sigma, np.ones(residuals.shape, dtype=bool))
+        share = (told[:, 1] / told.sum(axis=1))[:, None]
+        size, lines, joint = len(self), its[rows], self._joint[rows] * share
+        self._joint[rows] *= 1.0 - share
+        self._take(np.concatenate([np.arange(size), rows]))
+        self._joint[size:] = joint
+        matches[track.id][size:], matches[other.id][size:] = lines, _FALSE
+        self._found[axis][track.id][size:] = np.stack([residuals[:, 1], sigma], axis=1)
 
     def _covered(self, axis: int, lines: AxisLines, track: TrackedLine, reach_m: float) -> Flags:
         """(N, L): the map line has paint where the track was seen; by the drone's own place and `reach_m`
@@ -209,7 +281,7 @@ class Places:
         known &= ~gone
         missed &= ~gone
         dwell[gone] = 0.0
-        factors: Matrix = (1.0 - self._model.line_seen) ** new.sum(axis=1)
+        factors: Matrix = (1.0 - self._model.line_seen) ** new.sum(axis=1, keepdims=True)
         return factors
 
     def pass_ends(self, seen_m: Matrix, sure_m: float, leave_m: float, due_s: float, dt_s: float) -> Matrix:
@@ -236,34 +308,38 @@ class Places:
         new = (dwell_s > due_s) & ~done
         self._ends_done[row, end] = done | new
         overlooked = np.bincount(row[new], minlength=len(self)).astype(np.float64)
-        factors: Matrix = np.power(1.0 - self._model.end_found, overlooked)
+        factors: Matrix = np.power(1.0 - self._model.end_found, overlooked[:, None])
         return factors
 
     # Which places there are
 
     def add(self, at_m: Sequence[tuple[float, float]], weights: Sequence[float], sigma_m: float) -> None:
-        """Consider these places too; a place that is there already gains the weight."""
-        fresh_at, fresh_weights = [], []
+        """Consider these places too, of the floor as it looks from the likeliest; a place that is there
+        already gains the weight."""
+        fresh_at, fresh_weights, floor = [], [], self.floor
         for point, weight in zip(at_m, weights, strict=True):
             apart = np.abs(self.at_m - point).max(axis=1)
             near = int(apart.argmin())
             if apart[near] < _SAME_M:
-                self.weights[near] += weight
+                self._joint[near] += weight * floor
             else:
                 fresh_at.append(point)
                 fresh_weights.append(weight)
         if fresh_at:
-            self._grow(np.array(fresh_at), np.array(fresh_weights), sigma_m)
-        self.weights /= self.weights.sum()
+            self._grow(np.array(fresh_at), np.array(fresh_weights)[:, None] * floor, sigma_m)
+        self._joint /= self._joint.sum()
 
-    def _grow(self, at_m: Matrix, weights: Matrix, sigma_m: float) -> None:
-        count = len(weights)
+    def _grow(self, at_m: Matrix, joint: Matrix, sigma_m: float) -> None:
+        count = len(joint)
         self.at_m = np.concatenate([self.at_m, at_m])
         self.sigma_m = np.concatenate([self.sigma_m, np.full((count, 2), sigma_m)])
-        self.weights = np.concatenate([self.weights, weights])
+        self._joint = np.concatenate([self._joint, joint])
         for matches in self._matches:
             for id_, index in matches.items():
                 matches[id_] = np.concatenate([index, np.full(count, _UNMATCHED, dtype=np.int64)])
+        for found in self._found:
+            for id_, residual in found.items():
+                found[id_] = np.concatenate([residual, np.ones((count, 2))])
         for axis in (0, 1):
             width = self._known[axis].shape[1]
             # what is in view now was not watched from here: neither seen nor missed yet
@@ -276,23 +352,37 @@ class Places:
 
     def thin(self, most: int) -> None:
         """Join places that have become one, drop the negligible and all but the `most` likeliest."""
-        keep: Flags = self.weights >= _NEGLIGIBLE
+        weights = self.weights
+        keep: Flags = weights >= _NEGLIGIBLE
         if np.count_nonzero(keep) > most:
-            keep &= self.weights >= np.partition(self.weights, -most)[-most]
+            keep &= weights >= np.partition(weights, -most)[-most]
         self._keep(keep)
-        close = np.abs(self.at_m[:, None, :] - self.at_m[None, :, :]).max(axis=2) < _SAME_M
+        reach_m = np.clip(_DOUBT_SIGMAS * self.sigma_m, _LEAST_M, _SAME_M)
+        near = np.abs(self.at_m[:, None, :] - self.at_m[None, :, :]) < reach_m[:, None, :]
+        close: Flags = near[:, :, 0] & near[:, :, 1]
+        if np.count_nonzero(close) > len(self):
+            close &= self._alike()
         if np.count_nonzero(close) > len(self):
             keep = np.ones(len(self), dtype=bool)
             for row in np.argsort(-self.weights):
                 if keep[row] and row:
                     twins = close[row] & keep
                     twins[row] = False
-                    self.weights[row] += self.weights[twins].sum()
+                    self._joint[row] += self._joint[twins].sum(axis=0)
                     if twins[self.best]:
                         self.best = int(row)
                     keep &= ~twins
             self._keep(keep)
-        self.weights /= self.weights.sum()
+        self._joint /= self._joint.sum()
+
+    def _alike(self) -> Flags:
+        """(N, N) no track is one line at the one place and another one, or none, at the other."""
+        alike: Flags = np.ones((len(self), len(self)), dtype=bool)
+        for matches in self._matches:
+            for index in matches.values():
+                known = index != _UNMATCHED
+                alike[(index[:, None] != index[None, :]) & known[:, None] & known[None, :]] = False
+        return alike
 
     def _keep(self, keep: Flags) -> None:
         """Drop the other places, but neither elsewhere nor the best one."""
@@ -302,10 +392,13 @@ class Places:
             self._take(np.flatnonzero(keep))
 
     def _take(self, rows: Indices) -> None:
-        self.at_m, self.sigma_m, self.weights = self.at_m[rows], self.sigma_m[rows], self.weights[rows]
+        self.at_m, self.sigma_m, self._joint = self.at_m[rows], self.sigma_m[rows], self._joint[rows]
         for matches in self._matches:
             for id_, index in matches.items():
                 matches[id_] = index[rows]
+        for found in self._found:
+            for id_, residual in found.items():
+                found[id_] = residual[rows]
         for axis in (0, 1):
             self._known[axis] = self._known[axis][rows]
             self._missed[axis] = self._missed[axis][rows]

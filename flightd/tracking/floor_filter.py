@@ -350,6 +350,9 @@ class FloorFilter:
         for axis, push in enumerate(PUSH):
             if self._unseen_s[axis] > _UNSEEN_S:
                 self._x[push] = self.push_after(axis, dt_s)
+                kept = math.exp(-dt_s / self._noise.gust_s)  # and with the gust what is not known of it
+                self._p[push, :] *= kept
+                self._p[:, push] *= kept
             else:
                 share = min(dt_s / self._noise.steady_s, 1.0)
                 self._steady[axis] += share * (self.mean(push) - self._steady[axis])

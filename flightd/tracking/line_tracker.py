@@ -309,6 +309,7 @@ class LineTracker:
             push_y_mps2=held.push_after(1, (now_ns - self._stamp_ns) * 1e-9),
             markers=tuple(mark.moved(moved_x, moved_y) for mark in self._markers),
             features_ns=(self._features_ns[0], self._features_ns[1]),
+            velocity_sigma_mps=(held.sigma(VX), held.sigma(VY)),
         )
 
     def survey(self, axis: int, places_m: Mapping[int, float], sigma_m: float) -> None:

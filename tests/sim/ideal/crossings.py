@@ -33,6 +33,7 @@ from flightd.site.nearest_node import NodeIndex
 from flightd.site.site import Site
 from tests.sim.ideal.crossing_floors import uniform_grid, worn
 from tests.sim.ideal.crossing_motion import STEP_S, Motion
+from tests.sim.ideal.floor_points import FloorPoints
 from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
 
 CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml")
@@ -75,6 +76,8 @@ class Trouble:
     yaw_rad: float = math.radians(5.0)
     blind: float = 0.05
     """Share of the ways between nodes on which nothing at all is seen for up to a second."""
+    bare: bool = False
+    """The floor shows nothing but its lines that could be followed."""
     flicker: float = 0.04
     arms_wrong: float = 0.03
 
@@ -127,6 +130,7 @@ class Flight:
         camera = CONFIG.camera
         errors = EyeErrors(1.0, 0.002, trouble.flicker)
         self._eye = IdealEye(floor, camera.lens(), camera.mount(), errors, seed)
+        self._points = None if trouble.bare else FloorPoints(seed)
         self._estimator = StateEstimator(site, CONFIG, SURE, (believed or self._here, 0.0))
         self._estimator.begin((believed or self._here, 0.0), armed=True)
         node = site.nodes[self._here]
@@ -265,8 +269,13 @@ class Flight:
     def _see(self) -> LineSet:
         """What a detector would tell of a picture taken now."""
         rng, seen = self._rng, self._eye.see(self._motion.kinematics, self._steps, self._motion.now_ns)
+        points = self._points
         if self._blind_s > 0.0:
+            if points is not None:
+                points.lose()
             return replace(seen, lines=(), junctions=(), pads=())
+        if points is not None:
+            seen = replace(seen, features=points.see(self._eye.view(self._motion.kinematics)))
         told = (self._mistaken(one) for one in seen.junctions if rng.random() < _JUNCTION_SEEN)
         return replace(seen, junctions=tuple(one for one in told if one is not None))
 
@@ -320,13 +329,17 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--missing", type=share, default=usual.missing, help="share of the lines' parts")
     parser.add_argument("--false", type=lines, default=usual.false, help="lines in each cell")
     parser.add_argument("--blind", type=share, default=usual.blind, help="share of the ways between nodes")
+    parser.add_argument("--gusts", type=_number(0.0, 10.0), default=1.0, help="times the usual ones")
+    parser.add_argument("--bare", action="store_true", help="a floor that shows nothing but its lines")
     parser.add_argument("--from", dest="first", type=_number(0, 10**9, int), default=1, help="first seed")
     given = parser.parse_args(arguments)
 
     def told(seed: int, count: Count) -> None:
         print(f"seed {seed}: {count.words}", flush=True)
 
-    trouble = Trouble(missing=given.missing, false=given.false, blind=given.blind)
+    trouble = Trouble(
+        given.missing, given.false, gust_mps=given.gusts * usual.gust_mps, blind=given.blind, bare=given.bare
+    )
     total = bench(given.crossings, Grid(given.grid), trouble, given.first, told)
     print(f"in all: {total.words}")
     return 0 if total.undetected == 0 and total.availability >= LEAST_AVAILABILITY else 1

@@ -37,6 +37,36 @@ class EyeErrors:
     pad_px: float = 1.5
 
 
+@dataclass(frozen=True, slots=True)
+class EyeView:
+    """Where the camera is in one picture: (3, 3) map axes to image axes, (3,) its place on the map, in m."""
+
+    lens: Lens
+    image_from_map: np.ndarray
+    eye: np.ndarray
+
+    def pixel(self, x_m: float, y_m: float) -> tuple[float, float] | None:
+        """Centred image coordinates of a point of the floor, None near or beyond the border."""
+        lens = self.lens
+        a, b, c = (self.image_from_map @ (np.array([x_m, y_m, 0.0]) - self.eye)).tolist()
+        if c < 0.05:
+            return None
+        (cu, cv) = lens.centre_px
+        u, v = lens.fx_px * a / c + lens.cx_px - cu, lens.fy_px * b / c + lens.cy_px - cv
+        return (u, v) if abs(u) < cu - _BORDER_PX and abs(v) < cv - _BORDER_PX else None
+
+    def floor(self, across: float, down: float) -> tuple[float, float] | None:
+        """The point of the floor (m on the map) seen at such shares of the picture, None at the horizon."""
+        lens = self.lens
+        u = (across * (lens.width_px - 1) - lens.cx_px) / lens.fx_px
+        v = (down * (lens.height_px - 1) - lens.cy_px) / lens.fy_px
+        ray = self.image_from_map.T @ np.array([u, v, 1.0])
+        if ray[2] <= _GRAZING:
+            return None
+        x_m, y_m = (self.eye - self.eye[2] / ray[2] * ray)[:2].tolist()
+        return x_m, y_m
+
+
 class IdealEye:
     """Sees the painted lines of a site from a pose; the same seed makes the same errors."""
 
@@ -59,11 +89,17 @@ class IdealEye:
             for (x, y), arms in zip(features.at_m, features.arms, strict=True)
         ]
 
-    def see(self, pose: Kinematics, seq: int, stamp_ns: int) -> LineSet:
-        """The lines in the picture exposed at `pose`, in pixels of a distortion-free camera."""
+    def view(self, pose: Kinematics) -> EyeView:
+        """Of the picture exposed at `pose`."""
         map_from_body = heading_rotation(pose.yaw_rad) @ level_from_body(pose.roll_rad, pose.pitch_rad)
         image_from_map = (map_from_body @ self._mount.body_from_image()).T
         eye = np.array([pose.x_m, pose.y_m, -pose.height_m]) + map_from_body @ np.array(self._mount.offset_m)
+        return EyeView(self._lens, image_from_map, eye)
+
+    def see(self, pose: Kinematics, seq: int, stamp_ns: int) -> LineSet:
+        """The lines in the picture exposed at `pose`, in pixels of a distortion-free camera."""
+        view = self.view(pose)
+        image_from_map, eye = view.image_from_map, view.eye
         reach_m = self._reach_m(image_from_map, eye)
         near = (
             (painted, floor)
@@ -75,7 +111,7 @@ class IdealEye:
             line for line in seen if line is not None and self._random.random() >= self._errors.missed
         )
         lens = self._lens
-        junctions = self._junctions(image_from_map, eye, reach_m)
+        junctions = self._junctions(view, reach_m)
         mats = [pad for pad in self._site.pads if pad.sign is PadSign.MAT]
         pads = tuple(pad for pad in (self._pad(pad, image_from_map, eye) for pad in mats) if pad)
         markers = tuple(
@@ -128,18 +164,18 @@ class IdealEye:
             return math.inf
         return float((-eye[2] * np.hypot(corners[0], corners[1]) / corners[2]).max()) + _MARGIN_M
 
-    def _junctions(self, image_from_map: np.ndarray, eye: np.ndarray, reach_m: float) -> tuple[Junction, ...]:
+    def _junctions(self, view: EyeView, reach_m: float) -> tuple[Junction, ...]:
         """The crossings and ends in the picture, a little away from its border."""
         found = []
-        eye_x, eye_y = float(eye[0]), float(eye[1])
+        eye_x, eye_y = float(view.eye[0]), float(view.eye[1])
         for x, y, arms in self._features:
             if math.hypot(x - eye_x, y - eye_y) > reach_m:
                 continue
-            here = self._pixel(x, y, image_from_map, eye)
+            here = view.pixel(x, y)
             if here is None:
                 continue
             tips = [
-                self._pixel(x + _ARM_M * dx, y + _ARM_M * dy, image_from_map, eye)
+                view.pixel(x + _ARM_M * dx, y + _ARM_M * dy)
                 for bit, (dx, dy) in enumerate(ARM_DIRECTIONS)
                 if arms >> bit & 1
             ]
@@ -147,18 +183,6 @@ class IdealEye:
             if len(angles) == len(tips):
                 found.append(Junction(_KINDS[len(angles)], here[0], here[1], angles))
         return tuple(found)
-
-    def _pixel(
-        self, x_m: float, y_m: float, image_from_map: np.ndarray, eye: np.ndarray
-    ) -> tuple[float, float] | None:
-        """Centred image coordinates of a point of the floor, None near or beyond the border."""
-        lens = self._lens
-        a, b, c = (image_from_map @ (np.array([x_m, y_m, 0.0]) - eye)).tolist()
-        if c < 0.05:
-            return None
-        (cu, cv) = lens.centre_px
-        u, v = lens.fx_px * a / c + lens.cx_px - cu, lens.fy_px * b / c + lens.cy_px - cv
-        return (u, v) if abs(u) < cu - _BORDER_PX and abs(v) < cv - _BORDER_PX else None
 
     def _line(
         self, painted: PaintedLine, floor: np.ndarray, image_from_map: np.ndarray, eye: np.ndarray

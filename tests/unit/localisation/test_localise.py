@@ -69,6 +69,53 @@ def test_a_missed_cross_line_does_not_shift_the_node_count() -> None:
     assert abs(pose.along_m) < 0.02
 
 
+def test_of_two_lines_close_beside_each_other_the_one_seen_first_need_not_be_the_maps() -> None:
+    localiser, gap = GridLocaliser(SITE, "A1", FloorReach()), A2.x_m - A1.x_m
+    painted = (0, 0.0, 0.0), (1, gap - 0.13, gap - 0.9), (2, gap, gap - 0.6)
+    for tick in range(1, 200):
+        x = min(tick * 0.02 * 0.8, gap)
+        seen = [replace(line(i, at - x), seen_ns=tick * TICK_NS) for i, at, from_m in painted if x >= from_m]
+        seen = [one for one in seen if abs(one.offset_m) < 1.0]
+        pose = localiser.step(tracks(tick, seen, [line(0, 0.0)], vx=0.8 if x < gap else 0.0), 1.6)
+    assert abs(pose.x_m - A2.x_m) < 0.02, "it flew on along the line 13 cm before the true one"
+    assert localiser.map_lines(0).keys() == {2}
+
+
+def test_a_worn_floor_is_learnt_and_the_place_on_it_stays_known() -> None:
+    localiser, nodes = GridLocaliser(SITE, "A1", FloorReach()), [SITE.nodes[f"A{i}"] for i in range(1, 6)]
+    painted = [(i, node.x_m) for i, node in enumerate(nodes) if i != 2]
+    false = [(10 + i, node.x_m + 0.47) for i, node in enumerate(nodes[1:4])]
+    for tick in range(1, 480):
+        x = min(A1.x_m + tick * 0.02 * 0.8, nodes[-1].x_m)
+        near = [line(i, at - x) for i, at in painted + false if abs(at - x) < 0.9]
+        seen = [replace(one, seen_ns=tick * TICK_NS) for one in near]
+        along = replace(line(0, 0.0), seen_ns=tick * TICK_NS)
+        pose = localiser.step(tracks(tick, seen, [along], vx=0.8 if x < nodes[-1].x_m else 0.0), 1.6)
+    assert pose.node == nodes[-1].id
+    assert pose.integrity > 0.9
+
+
+def test_on_a_kept_floor_a_slip_by_a_cell_is_not_taken_for_wear() -> None:
+    localiser = GridLocaliser(SITE, "A1", FloorReach())
+    along = [SITE.nodes[f"A{i}"].x_m for i in range(2, 7)]
+    for tick in range(1, 700):
+        x = min(A2.x_m + tick * 0.02 * 0.8, along[-1])
+        seen = [line(i, at - x) for i, at in enumerate(along) if abs(at - x) < 0.9]
+        pose = localiser.step(tracks(tick, seen, [line(0, 0.0)], vx=0.8 if x < along[-1] else 0.0), 1.6)
+        wrong = abs(pose.x_m - x) > 0.5
+        assert not (wrong and pose.integrity > 0.99), "started one node further than it was told"
+
+
+def test_only_a_line_that_lay_below_says_where_on_the_map_it_is() -> None:
+    localiser = GridLocaliser(SITE, "A1", FloorReach())
+    along = [SITE.nodes[f"A{i}"].x_m for i in range(1, 5)]
+    for tick in range(1, 250):
+        x = min(tick * 0.02 * 0.8, along[2])
+        seen = [line(i, at - x) for i, at in enumerate(along) if abs(at - x) < 2.2]
+        localiser.step(tracks(tick, seen, [line(0, 0.0)], vx=0.8 if x < along[2] else 0.0), 1.6)
+    assert localiser.map_lines(0) == {1: along[1], 2: along[2]}, "the fourth is in view, ahead"
+
+
 def test_without_lines_the_doubt_grows() -> None:
     localiser = GridLocaliser(SITE, "A1", FloorReach())
     first = localiser.step(tracks(1, [line(0, 0.0)], [line(0, 0.0)]), 1.6)
@@ -110,7 +157,8 @@ def test_features_of_the_floor_carry_the_position_on_for_as_far_as_they_may() ->
     for tick in range(20, 400):
         moving = tracks(tick, [], [], vx=0.8)
         at_ns = moving.stamp_ns - 100_000_000
-        pose = localiser.step(replace(moving, features_ns=(at_ns, at_ns), pads_ns=at_ns), 1.6)
+        carried = replace(moving, features_ns=(at_ns, at_ns), pads_ns=at_ns, velocity_sigma_mps=(0.03, 0.03))
+        pose = localiser.step(carried, 1.6)
         if min(localiser.told_ns) == at_ns:
             told_m = pose.x_m - A1.x_m
     assert 2.9 < told_m < 3.3
