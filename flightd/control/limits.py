@@ -22,7 +22,8 @@ class Surroundings:
     `data_age_s` the age of the oldest thing that the lean was computed from, for a brake that of the newest:
     pictures or attitude, either tells enough to come to rest by.  `at_once`: an emergency stop is not kept
     waiting by the rates.  `climb_error_mps`: the vehicle takes its climb for so much more than it is.
-    `most_lean_rad`: the lean as a whole is no greater, whatever each axis is allowed."""
+    `most_lean_rad`: the lean as a whole is no greater, whatever each axis is allowed.  `haste`: the share of
+    the configured tilt rate and jerk that it may change by."""
 
     headroom_m: float = math.inf
     back: tuple[float, float] | None = None
@@ -30,6 +31,7 @@ class Surroundings:
     at_once: bool = False
     climb_error_mps: float = 0.0
     most_lean_rad: float = math.inf
+    haste: float = 1.0
 
 
 OPEN = Surroundings()
@@ -63,7 +65,7 @@ class Limiter:
             most = max(abs(roll), abs(pitch), limits.max_tilt_rad) / limits.max_tilt_rad
             roll, pitch = roll / most, pitch / most
         if not around.at_once:
-            roll, pitch = self._swing(roll, pitch, dt_s)
+            roll, pitch = self._swing(roll, pitch, around.haste * dt_s)
             yaw_rate = last.yaw_rate_radps + _clamp(
                 yaw_rate - last.yaw_rate_radps, limits.expert.max_yaw_accel_radps2 * dt_s
             )

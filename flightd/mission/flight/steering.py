@@ -19,6 +19,10 @@ _TOUCHDOWN_S = 2.0
 _LOW_M, _LOW_LEAN_RAD = 0.5, math.radians(5.0)
 """Below this height a landing leans by no more: it may stand already, which is known a second later."""
 
+_LEAST_HASTE = 0.4
+"""While it is not known how late pictures are against the attitude, a lean that changes fast makes the lines
+seem to move: it changes by no less than this share of what is configured."""
+
 
 class Steering:
     """Call `step` at each tick."""
@@ -78,6 +82,7 @@ class Steering:
             at_once=guidance.at_once,
             most_lean_rad=_LOW_LEAN_RAD if self._lands_low else math.inf,
             climb_error_mps=inputs.warnings.climb_error_mps,
+            haste=max(conditions.ease**2, _LEAST_HASTE),
         )
         return self._limiter.apply(wanted, around)
 
