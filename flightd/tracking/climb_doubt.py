@@ -4,7 +4,8 @@ An autopilot flies by its own climb rate.  Where a door opens or a duct blows, t
 a drone that is to hover climbs while it tells that it does not.  Goods below move the range finder alone, a
 range finder that sticks leaves the width of the lines to change alone: only both together contradict it.
 Where the range finder tells nothing the lines contradict it alone, but only those that are seen for a while:
-over bare floor a seam that shows in a few frames is as wide as a line from another height.
+over bare floor a seam that shows in a few frames is as wide as a line from another height.  Nor does a frame
+count whose width leapt: an echo makes the range finder agree with the one stripe that is wide enough.
 """
 
 from __future__ import annotations
@@ -58,10 +59,11 @@ class ClimbDoubt:
         samples = self._samples
         while samples and stamp_ns - samples[0].stamp_ns > _WINDOW_NS:
             samples.popleft()
-        if not self._goes_on(new):
+        last, leaps = self._last, self._leaps(new)
+        if leaps or last is None or stamp_ns - last.stamp_ns > _GAP_NS:
             self._since_ns = stamp_ns
         self._last = new
-        if alone and stamp_ns - self._since_ns < _ALONE_NS:
+        if (leaps and not self.found) or (alone and stamp_ns - self._since_ns < _ALONE_NS):
             self._noticed = self.found
             return
         off_m = _most_off_m(new, samples)
@@ -76,12 +78,12 @@ class ClimbDoubt:
         self._samples.clear()
         self._last = None
 
-    def _goes_on(self, new: _Sample) -> bool:
-        last = self._last
-        if last is None or new.stamp_ns - last.stamp_ns > _GAP_NS:
+    def _leaps(self, new: _Sample) -> bool:
+        """Its width is another line's than the one before."""
+        if self._last is None:
             return False
-        leap = LEAP + LEAP_PER_S * (new.stamp_ns - last.stamp_ns) * 1e-9
-        return abs(new.width_m / last.width_m - 1.0) < leap
+        leap = LEAP + LEAP_PER_S * (new.stamp_ns - self._last.stamp_ns) * 1e-9
+        return abs(new.width_m / self._last.width_m - 1.0) >= leap
 
     def error_mps(self, now_ns: int) -> float:
         """How much too great the told rate is; 0 where nothing is noticed, and while the heights do not agree

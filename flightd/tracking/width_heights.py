@@ -21,13 +21,15 @@ of it, within so much on average: a range finder that reads too little from the 
 _OTHER_S = 2.95
 """The same for a line of another width than those before it, of which no range finder can be the cause."""
 _UNMEASURED_M = 0.35
-"""Range finders need not measure less: one that reads its least above a drone that stands is right."""
+"""Range finders need not measure less: one that reads its least above a drone that stands, or is hardly up, is
+right, and tells no height."""
 _LOW_M, _NOT_LOW_M = 0.5, 0.9
 """Up to here lines are so wide in the picture that they tell its height better than a range finder, which
 lags behind a take-off or measures nothing yet; from there up to there both tell it."""
 _LOW_SHARE = 0.35
 """A line that tells a height further off than by this share of it (its logarithm) may be none of the map: a
-take-off of 0.9 m/s is told 0.1 m too low by a range finder that lags 0.1 s."""
+take-off of 0.9 m/s is told 0.1 m too low by a range finder that lags 0.1 s.  But for a height that the range
+finder cannot measure: what its least reading is off from there is no error of the line."""
 _RISES_MPS = 1.5
 """No take-off climbs faster, so near the floor its heights change by no more."""
 
@@ -46,6 +48,9 @@ class WidthHeights:
         self._told_m = 0.0
         self.by_width_m: float | None = None
         """What the newest frame's lines tell, where they could be held against a height; None where not."""
+        self.followed_m: float | None = None
+        """The same by the line that goes on from the frame before: the height told has no say in which."""
+        self._followed_last_m: float | None = None
 
     @property
     def share(self) -> float:
@@ -67,7 +72,7 @@ class WidthHeights:
         """The height `told_m` of a frame exposed at `stamp_ns`, unless there is none or the heights of its
         lines by their widths contradict it for long: then theirs.  Theirs at once where they go on as before
         and what is told leaps away from them."""
-        self.by_width_m = None
+        self.by_width_m = self.followed_m = None
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
@@ -96,10 +101,19 @@ class WidthHeights:
         if self._last_m is not None:
             self._changes += gain * (change / (_STEADY + _STEADY_PER_S * dt_s) - self._changes)
             self._followed = agrees or (self._followed and goes_on)
+        self.followed_m = self._followed_last_m = self._going_on(by_width_m, dt_s) or nearest_m
         self._last_m = self.by_width_m = nearest_m
         self._told_m = told_m
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
         return nearest_m if leapt or self._believed_share != 1.0 else told_m
+
+    def _going_on(self, by_width_m: Sequence[float], dt_s: float) -> float | None:
+        """The height by the line that is as wide as the one followed in the frame before."""
+        last_m = self._followed_last_m
+        if last_m is None:
+            return None
+        nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
+        return nearest_m if abs(nearest_m / last_m - 1.0) < LEAP + LEAP_PER_S * dt_s else None
 
     def _change(self, nearest_m: float, share: float) -> float:
         """By how much both what the widths tell and its share of what is told have changed, as a share: then
@@ -137,8 +151,9 @@ class NearFloor:
         self._last_m = now_m = min(by_width_m, key=lambda one_m: abs(math.log(one_m / told_m)))
         off = math.log(now_m / told_m)
         goes_on = last_m is not None and abs(now_m - last_m) < LEAP * now_m + _RISES_MPS * dt_s
+        near = abs(off) < _LOW_SHARE or now_m < told_m < _UNMEASURED_M
         low = min((_NOT_LOW_M - told_m) / (_NOT_LOW_M - _LOW_M), 1.0)
-        return told_m * math.exp(low * off) if goes_on and abs(off) < _LOW_SHARE else told_m
+        return told_m * math.exp(low * off) if goes_on and near else told_m
 
 
 class _Watched:
