@@ -125,7 +125,7 @@ class StateEstimator:
         self._stuck = StuckHeight()
         self.climb = ClimbDoubt()
         self._climbed = HeightHistory()
-        self._climbed_m, self._climb_ns = 0.0, 0
+        self._climbed_m, self._climb_ns, self._climb_mps = 0.0, 0, math.nan
         self._carried = CarriedHeight()
         self._waiting: deque[LineSet] = deque()
         self._judged_ns = self._shared_ns = 0
@@ -277,7 +277,8 @@ class StateEstimator:
         measured_m, climbed_m = self._heights.at(exposed_ns), self._climbed.at(exposed_ns)
         height_m = carried.at(exposed_ns, measured_m, climbed_m)
         error_m = math.hypot(self._heights.error_m, carried.error_m(exposed_ns))
-        used, by_width_m = self.tracker.frame(lines, height_m, error_m), self.tracker.by_width_m
+        used = self.tracker.frame(lines, height_m, error_m, self._climb_mps)
+        by_width_m = self.tracker.by_width_m
         if used and by_width_m is not None:
             carried.by_width(exposed_ns, by_width_m, climbed_m)
         # without a range finder the lines alone contradict the climb: such a drone lands anyhow
@@ -295,6 +296,7 @@ class StateEstimator:
 
     def _count_climb(self, now_ns: int, climb_mps: float) -> None:
         """What the vehicle tells to have climbed; over a gap nothing is compared."""
+        self._climb_mps = climb_mps
         if math.isnan(climb_mps):
             self._climbed, self._climb_ns = HeightHistory(), 0
             self.climb.forget()

@@ -59,7 +59,7 @@ from flightd.tracking.tilt_compensation import (
     ground_lines,
     heights_by_width,
 )
-from flightd.tracking.width_heights import NearFloor, WidthHeights
+from flightd.tracking.width_heights import NearFloor, WidthHeights, climbed_between_m
 
 _STEP_NS = 20_000_000
 _FARTHEST = 3.0
@@ -199,9 +199,11 @@ class LineTracker:
         """When the frame was exposed, by what has been learnt of the camera's delay."""
         return lines.stamp_ns + round(self._filter.mean(DELAY) * 1e9)
 
-    def frame(self, lines: LineSet, height_m: float, height_sigma_m: float = 0.0) -> bool:
-        """Take the lines of one frame seen at `height_m`, known to `height_sigma_m`; False when it could not
-        be used (older than the last, no attitude at its exposure, no height)."""
+    def frame(
+        self, lines: LineSet, height_m: float, height_sigma_m: float = 0.0, climb_mps: float = 0.0
+    ) -> bool:
+        """Take the lines of one frame seen at `height_m`, known to `height_sigma_m`, in a climb of so much;
+        False when it could not be used (older than the last, no attitude at its exposure, no height)."""
         stamp_ns = self.exposed_ns(lines)
         attitude = self._history.at(stamp_ns)
         if attitude is None or not self._headed or lines.stamp_ns <= self._told_ns:
@@ -210,7 +212,8 @@ class LineTracker:
         view = self._view(attitude, stamp_ns, height_m, self._lens)
         by_width_m = [one for one in heights_by_width(lines.lines, view, self._line_width_m) if one > 0.0]
         off_share = self._filter.mean(HEIGHT) + self._filter.mean(HEIGHT_SCALE)
-        height_m = self._widths.believed_m(by_width_m, height_m, stamp_ns) * (1.0 + off_share)
+        climbed_m = climbed_between_m(climb_mps, self.delay_sigma_s)
+        height_m = self._widths.believed_m(by_width_m, height_m, stamp_ns, climbed_m) * (1.0 + off_share)
         by_lens = 1.0 - self._filter.mean(SCALE)
         height_m = self._near_floor.height_m([by_lens * one for one in by_width_m], height_m, stamp_ns)
         if not height_m > 0:

@@ -32,6 +32,19 @@ take-off of 0.9 m/s is told 0.1 m too low by a range finder that lags 0.1 s.  Bu
 finder cannot measure: what its least reading is off from there is no error of the line."""
 _RISES_MPS = 1.5
 """No take-off climbs faster, so near the floor its heights change by no more."""
+_RANGE_LAG_S, _DELAY_SIGMAS = 0.1, 2.0
+"""A range finder tells the height of so long before its stamp at most: what it averages over.  A frame is of so
+many standard deviations of its delay earlier or later at most."""
+
+
+def climbed_between_m(climb_mps: float, delay_sigma_s: float) -> tuple[float, float]:
+    """The least and the most that a vehicle may climb, at that rate (NaN: not known), from when the height was
+    true that its range finder tells of a frame's exposure until the frame was exposed."""
+    if math.isnan(climb_mps):
+        return 0.0, 0.0
+    unsure_s = _DELAY_SIGMAS * delay_sigma_s
+    one_m, other_m = -unsure_s * climb_mps, (_RANGE_LAG_S + unsure_s) * climb_mps
+    return min(one_m, other_m), max(one_m, other_m)
 
 
 class WidthHeights:
@@ -68,10 +81,17 @@ class WidthHeights:
         """How much higher the height was told last than the widths have it, by that share, m."""
         return self._told_m - self._told_m / self.share
 
-    def believed_m(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int) -> float:
+    def believed_m(
+        self,
+        by_width_m: Sequence[float],
+        told_m: float,
+        stamp_ns: int,
+        climbed_m: tuple[float, float] = (0.0, 0.0),
+    ) -> float:
         """The height `told_m` of a frame exposed at `stamp_ns`, unless there is none or the heights of its
         lines by their widths contradict it for long: then theirs.  Theirs at once where they go on as before
-        and what is told leaps away from them."""
+        and what is told leaps away from them.  `climbed_m` is the least and the most that may have been
+        climbed from when that height was true until that exposure: what it explains contradicts nothing."""
         self.by_width_m = self.followed_m = None
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
@@ -97,7 +117,8 @@ class WidthHeights:
             if steady_share is None:  # then it is the line that is another
                 return told_m / self._believed_share
             self._judged, self._share, self._watched = True, steady_share, _Watched()
-        self._share += gain * (share - self._share)
+        least_m, most_m = (told_m + by_m for by_m in climbed_m)
+        self._share += gain * (min(max(nearest_m, least_m), most_m) / nearest_m - self._share)
         if self._last_m is not None:
             self._changes += gain * (change / (_STEADY + _STEADY_PER_S * dt_s) - self._changes)
             self._followed = agrees or (self._followed and goes_on)

@@ -24,6 +24,8 @@ _CLIMB_FRESH_NS = 250_000_000
 _LANDED_STALE_NS = 1_000_000_000
 _NEAR_LEAST_M = 0.15
 """Seen so little above its range finder's minimum, a vehicle may be below it at the next sample."""
+_CLIMBS_MPS = 0.2
+"""But not one that climbs so fast: what it reads then is no measurement."""
 
 
 class VehicleClock(Protocol):
@@ -155,14 +157,17 @@ class NewestReadings:
             if self._attitude is not None:
                 tilt_cos = math.cos(self._attitude.roll_rad) * math.cos(self._attitude.pitch_rad)
             height_m = sample.distance_m * max(tilt_cos, 0.0)
-            if self._leap_gate.accepts(height_m, sample.distance_m, stamp_ns) or not self.armed:
+            climb_mps = self.fresh_climb_mps(now_ns)
+            if self._leap_gate.accepts(height_m, sample.distance_m, stamp_ns, climb_mps) or not self.armed:
                 self._range_m, self._range_ns = height_m, stamp_ns
         elif sample.is_below and self._is_low(sample.least_m, now_ns):
             self._range_m, self._range_ns = sample.least_m, stamp_ns
 
     def _is_low(self, least_m: float, now_ns: int) -> bool:
-        """Whether the vehicle stands, or was last seen hardly higher than the sensor's minimum."""
-        if not self.armed or self._range_m <= least_m + _NEAR_LEAST_M:
+        """Whether the vehicle stands, or was last seen hardly higher than the sensor's minimum, and did not
+        climb away from there."""
+        climbs = self._range_m > least_m and self.fresh_climb_mps(now_ns) > _CLIMBS_MPS
+        if not self.armed or (self._range_m <= least_m + _NEAR_LEAST_M and not climbs):
             return True
         return math.isnan(self._range_m) and self.landed(now_ns) is LandedState.ON_GROUND
 
