@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,13 +13,24 @@ _MS = 1_000_000
 _HEIGHTS = st.floats(0.05, 8.0, allow_nan=False)
 
 
-def accepted(*heights_m: float, every_ms: int = 50) -> list[bool]:
+def accepted(*heights_m: float, every_ms: int = 50, climb_mps: float = math.nan) -> list[bool]:
     gate = HeightLeapGate()
-    return [gate.accepts(height, height, n * every_ms * _MS) for n, height in enumerate(heights_m)]
+    return [gate.accepts(height, height, n * every_ms * _MS, climb_mps) for n, height in enumerate(heights_m)]
 
 
 def test_one_echo_is_not_believed_and_what_follows_is() -> None:
     assert accepted(1.6, 1.62, 2.9, 1.61, 1.6) == [True, True, False, True, True]
+
+
+def test_an_echo_after_a_gap_is_a_leap_where_no_climb_is_told_that_makes_it() -> None:
+    """Every third reading of 20 Hz was lost: 0.4 m more than 0.1 s before."""
+    echo = 1.55, 1.93, 1.56
+    assert accepted(*echo, every_ms=100, climb_mps=0.1) == [True, False, True]
+    assert all(accepted(*echo, every_ms=100, climb_mps=2.0))
+    assert all(accepted(*echo, every_ms=100))
+    for climb_mps in (-2.5, 0.0, 2.5):  # also one that is told 1 m/s too slow
+        told_mps = climb_mps - math.copysign(1.0, climb_mps)
+        assert all(accepted(*(5.0 + climb_mps * 0.2 * n for n in range(5)), every_ms=200, climb_mps=told_mps))
 
 
 def test_goods_below_are_believed_with_the_second_reading() -> None:

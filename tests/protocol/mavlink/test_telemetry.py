@@ -100,6 +100,17 @@ def test_standing_lower_than_the_sensor_measures_is_a_height(read: int) -> None:
     assert heights(*sinking, armed=True, telemetry=telemetry)[-1] == pytest.approx(0.2)
 
 
+@pytest.mark.parametrize(("vz_cmps", "read_m"), [(-70, 0.24), (0, 0.2), (70, 0.2)])
+def test_nothing_seen_right_above_the_least_reading_is_that_one_only_where_it_does_not_climb(
+    vz_cmps: int, read_m: float
+) -> None:
+    """A range finder that drops out in a take-off told 0.3 m of one at 0.5 m."""
+    telemetry = MavlinkTelemetry(ClockSync())
+    heights(distance(0), telemetry=telemetry)
+    climbs = [position(0, 100, vz=vz_cmps), distance(24), distance(0)]
+    assert heights(*climbs, armed=True, telemetry=telemetry)[-1] == pytest.approx(read_m)
+
+
 def test_nothing_seen_from_high_up_is_not_the_floor() -> None:
     telemetry = MavlinkTelemetry(ClockSync())
     heights(distance(0), telemetry=telemetry)

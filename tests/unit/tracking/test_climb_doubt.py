@@ -40,12 +40,33 @@ def test_both_heights_against_the_told_climb_say_by_how_much_it_errs(drift_mps: 
         pytest.param(lambda s: 2.0 - (s > 2.0), lambda s: 2.0, lambda s: 0.0, id="goods came below"),
         pytest.param(lambda s: 2.0, lambda s: 2.0 - 0.8 * (s > 2.0), lambda s: 0.0, id="another line"),
         pytest.param(lambda s: 1.0 + 0.1 * s, lambda s: 1.0 + 0.1 * s, lambda s: 0.0, id="a slow drift"),
+        pytest.param(
+            lambda s: 1.6 + 0.4 * (2.4 < s < 2.6),
+            lambda s: 1.6 + 0.59 * (2.45 < s < 2.55),
+            lambda s: 0.0,
+            id="an echo, and a wide stripe",
+        ),
     ],
 )
 def test_one_of_them_alone_does_not_contradict_the_climb(range_m: Of, width_m: Of, climbed_m: Of) -> None:
     doubt, now_ns = flown(range_m, width_m, climbed_m)
     assert not doubt.found
     assert abs(doubt.error_mps(now_ns)) < 0.15
+
+
+def test_a_drift_is_found_as_soon_though_the_width_leaps_for_a_frame() -> None:
+    def found_s(leaps_s: float) -> float:
+        doubt = ClimbDoubt()
+        for frame in range(100):
+            at_s = frame * _FRAME_NS * 1e-9
+            width_m = (1.6 + at_s) * (1.4 if leaps_s < at_s < leaps_s + 0.04 else 1.0)
+            doubt.step(1 + frame * _FRAME_NS, 1.6 + at_s, width_m, 0.0)
+            if doubt.found:
+                return at_s
+        return math.inf
+
+    assert found_s(math.inf) == pytest.approx(0.38, abs=0.02)
+    assert all(found_s(leaps_s) == found_s(math.inf) for leaps_s in (0.1, 0.2, 0.25))
 
 
 def alone(width_m: Of, shows: Callable[[float], bool] = lambda _: True) -> ClimbDoubt:

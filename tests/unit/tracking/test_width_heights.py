@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Sequence
 
 import pytest
 
-from flightd.tracking.width_heights import NearFloor, WidthHeights
+from flightd.tracking.width_heights import NearFloor, WidthHeights, climbed_between_m
 
 
 class Frames(WidthHeights):
@@ -17,10 +18,12 @@ class Frames(WidthHeights):
         super().__init__()
         self._period_ns, self._at_ns = round(1e9 / fps), 0
 
-    def sees(self, by_width_m: Sequence[float], told_m: float) -> float:
+    def sees(
+        self, by_width_m: Sequence[float], told_m: float, climbed_m: tuple[float, float] = (0.0, 0.0)
+    ) -> float:
         """What is believed of the next frame."""
         self._at_ns += self._period_ns
-        return self.believed_m(by_width_m, told_m, self._at_ns)
+        return self.believed_m(by_width_m, told_m, self._at_ns, climbed_m)
 
 
 def test_a_height_that_all_widths_contradict_is_theirs() -> None:
@@ -71,6 +74,45 @@ def test_a_height_that_leaps_away_from_a_width_is_not_believed_for_one_frame() -
         heights.sees([1.6], 1.6)
     assert heights.sees([1.59], 0.9) == 1.59
     assert heights.sees([1.58], 1.58) == 1.58
+
+
+def test_the_line_that_is_followed_is_none_that_the_told_height_chooses() -> None:
+    """An echo of 1.3 times the way, over a stripe that is as wide as from there."""
+    heights = Frames()
+    for told_m in (1.6, 1.6, 1.7, 1.85, 2.05, 2.05):
+        heights.sees([1.6, 1.75, 1.9, 2.1], told_m)
+        assert heights.followed_m == 1.6
+    assert heights.by_width_m == 2.1
+    heights.sees([2.1], 2.05)
+    assert heights.followed_m == 2.1
+    heights.sees([], 2.05)
+    assert heights.followed_m is None
+
+
+@pytest.mark.parametrize("climb_mps", [-1.0, 1.0])
+def test_what_a_late_range_finder_tells_in_a_climb_does_not_contradict_the_widths(climb_mps: float) -> None:
+    """0.1 s late by itself, over a frame that is 40 ms later than it is thought to be."""
+    told, at_once = Frames(), Frames()
+    between_m = climbed_between_m(climb_mps, 0.02)
+    assert between_m == pytest.approx(sorted((-0.04 * climb_mps, 0.14 * climb_mps)))
+    for n in range(30):
+        true_m = (0.5 if climb_mps > 0.0 else 1.5) + climb_mps * n / 30.0
+        told.sees([true_m], true_m - 0.14 * climb_mps, between_m)
+        at_once.sees([true_m], true_m - 0.14 * climb_mps)
+    assert told.share == pytest.approx(1.0, abs=0.01)
+    assert abs(at_once.share - 1.0) > 0.09
+
+
+def test_what_no_climb_explains_contradicts_the_widths_by_the_rest() -> None:
+    """One that reads the half, as soon in a climb as in a hover; and one that is late the other way."""
+    half, early = Frames(), Frames()
+    for n in range(45):
+        true_m = 0.3 + n / 30.0
+        half.sees([true_m], 0.5 * true_m, climbed_between_m(1.0, 0.01))
+        early.sees([1.5], 1.9, climbed_between_m(1.0, 0.01))
+    assert half.share < 0.7
+    assert early.share > 1.2
+    assert climbed_between_m(math.nan, 0.03) == (0.0, 0.0)
 
 
 def test_a_line_of_another_width_does_not_contradict_the_height_at_once() -> None:
@@ -177,6 +219,16 @@ def test_near_the_floor_the_widths_tell_the_height_and_higher_up_the_range_finde
     assert all(share == pytest.approx(0.97, abs=0.01) for true_m, share in off if 0.25 < true_m < 0.55)
     assert all(share > (true_m - 0.09) / true_m for true_m, share in off if 0.4 < true_m < 0.95)
     assert all(share * true_m == pytest.approx(true_m - 0.09) for true_m, share in off if true_m > 1.0)
+
+
+@pytest.mark.parametrize("true_m", [0.1, 0.15, 0.2, 0.25])
+def test_below_what_a_range_finder_measures_a_line_tells_the_height_however_far_off_its_least_is(
+    true_m: float,
+) -> None:
+    """What leapt when the line came near enough to it was learnt as a delay of the camera."""
+    heights = NearFloor()
+    placed = [heights.height_m([true_m + 0.01 * n], 0.3, n * 50_000_000) for n in range(4)]
+    assert placed[1:] == pytest.approx([true_m + 0.01 * n for n in range(1, 4)])
 
 
 @pytest.mark.parametrize("share", [0.45, 0.69, 1.45, 2.0])
