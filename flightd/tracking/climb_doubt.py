@@ -4,8 +4,8 @@ An autopilot flies by its own climb rate.  Where a door opens or a duct blows, t
 a drone that is to hover climbs while it tells that it does not.  Goods below move the range finder alone, a
 range finder that sticks leaves the width of the lines to change alone: only both together contradict it.
 Where the range finder tells nothing the lines contradict it alone, but only those that are seen for a while:
-over bare floor a seam that shows in a few frames is as wide as a line from another height.  Nor does a frame
-count whose width leapt: an echo makes the range finder agree with the one stripe that is wide enough.
+over bare floor a seam that shows in a few frames is as wide as a line from another height.  Nor do a few frames
+of a width that goes on from none before count beside it: of all stripes an echo may agree with one.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ From `_NOTICED_M` on the climb is put right: a door's gust moves a drone by a me
 _AGREEING_M, _AGREEING_SHARE = 0.12, 0.25
 """So far the changes of the two heights may differ: one of them is scaled, the other one noisy."""
 _ALONE_NS, _GAP_NS = 400_000_000, 150_000_000
-"""So long lines have to be seen to tell anything alone, in frames no further apart."""
+"""So long lines have to be seen to tell anything alone, in frames no further apart; beside the range finder,
+lines as wide as none that was followed."""
+_LEAP_NS = 100_000_000
+"""A width goes on from an older one by no more than it may change within so long."""
 _ALONE_M = 1.75
 """From so high on what they contradict alone counts for less: a width is noisy by a share of the height."""
 _RATE_NS, _HELD_NS = 300_000_000, 500_000_000
@@ -47,6 +50,9 @@ class ClimbDoubt:
         self._last: _Sample | None = None
         self._since_ns = 0
         """Since when each frame's width went on from that of the one before."""
+        self._followed: _Sample | None = None
+        self._strange_ns: int | None = None
+        """Since when no frame's width went on from that of the one followed."""
         self._samples: deque[_Sample] = deque()
 
     def step(
@@ -59,11 +65,16 @@ class ClimbDoubt:
         samples = self._samples
         while samples and stamp_ns - samples[0].stamp_ns > _WINDOW_NS:
             samples.popleft()
-        last, leaps = self._last, self._leaps(new)
-        if leaps or last is None or stamp_ns - last.stamp_ns > _GAP_NS:
+        last, self._last = self._last, new
+        if last is None or stamp_ns - last.stamp_ns > _GAP_NS:
+            self._since_ns, self._followed = stamp_ns, None
+        elif not _goes_on(new, last):
             self._since_ns = stamp_ns
-        self._last = new
-        if (leaps and not self.found) or (alone and stamp_ns - self._since_ns < _ALONE_NS):
+        if alone:
+            self._followed, unsure = None, stamp_ns - self._since_ns < _ALONE_NS
+        else:
+            unsure = self._is_strange(new)
+        if unsure:
             self._noticed = self.found
             return
         off_m = _most_off_m(new, samples)
@@ -78,12 +89,16 @@ class ClimbDoubt:
         self._samples.clear()
         self._last = None
 
-    def _leaps(self, new: _Sample) -> bool:
-        """Its width is another line's than the one before."""
-        if self._last is None:
-            return False
-        leap = LEAP + LEAP_PER_S * (new.stamp_ns - self._last.stamp_ns) * 1e-9
-        return abs(new.width_m / self._last.width_m - 1.0) >= leap
+    def _is_strange(self, new: _Sample) -> bool:
+        """Its width is another line's than the one followed, and has not been seen for long.  None is once the
+        climb was found to be wrong: it is put right down to the floor, where no line is followed."""
+        followed = self._followed
+        if not (self.found or followed is None or _goes_on(new, followed)):
+            self._strange_ns = self._strange_ns or new.stamp_ns
+            if new.stamp_ns - self._strange_ns < _ALONE_NS:
+                return True
+        self._followed, self._strange_ns = new, None
+        return False
 
     def error_mps(self, now_ns: int) -> float:
         """How much too great the told rate is; 0 where nothing is noticed, and while the heights do not agree
@@ -97,6 +112,11 @@ class ClimbDoubt:
         if span_s < 0.4e-9 * _RATE_NS or not _agree(new, old):
             return 0.0
         return ((new.climbed_m - old.climbed_m) - (new.range_m - old.range_m)) / span_s
+
+
+def _goes_on(new: _Sample, last: _Sample) -> bool:
+    since_ns = min(new.stamp_ns - last.stamp_ns, _LEAP_NS)
+    return abs(new.width_m / last.width_m - 1.0) < LEAP + LEAP_PER_S * since_ns * 1e-9
 
 
 def _most_off_m(new: _Sample, samples: Iterable[_Sample]) -> float:
