@@ -283,8 +283,8 @@ class StateEstimator:
             carried.by_width(exposed_ns, by_width_m, climbed_m)
         # without a range finder the lines alone contradict the climb: such a drone lands anyhow
         alone = math.isnan(measured_m)
-        width_m = self.tracker.by_followed_width_m if used else None
-        told_m = width_m if alone else measured_m
+        told_m = by_width_m if alone else measured_m
+        width_m = by_width_m if used else None
         if width_m is None and self.climb.found and not alone:
             width_m = measured_m  # near the floor no line is wide enough: what both have told goes on
         if told_m is not None and told_m < _CLIMB_DOUBT_M and not self.climb.found:

@@ -151,11 +151,6 @@ class LineTracker:
         return self._widths.by_width_m
 
     @property
-    def by_followed_width_m(self) -> float | None:
-        """The same by the line that goes on from the frame before, whatever height is told."""
-        return self._widths.followed_m
-
-    @property
     def widths_tell(self) -> bool:
         """The lines of the newest frame tell a height by their width, and so do those before, steadily."""
         return self._widths.tell

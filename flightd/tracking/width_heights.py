@@ -61,9 +61,6 @@ class WidthHeights:
         self._told_m = 0.0
         self.by_width_m: float | None = None
         """What the newest frame's lines tell, where they could be held against a height; None where not."""
-        self.followed_m: float | None = None
-        """The same by the line that goes on from the frame before: the height told has no say in which."""
-        self._followed_last_m: float | None = None
 
     @property
     def share(self) -> float:
@@ -92,7 +89,7 @@ class WidthHeights:
         lines by their widths contradict it for long: then theirs.  Theirs at once where they go on as before
         and what is told leaps away from them.  `climbed_m` is the least and the most that may have been
         climbed from when that height was true until that exposure: what it explains contradicts nothing."""
-        self.by_width_m = self.followed_m = None
+        self.by_width_m = None
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
@@ -122,19 +119,10 @@ class WidthHeights:
         if self._last_m is not None:
             self._changes += gain * (change / (_STEADY + _STEADY_PER_S * dt_s) - self._changes)
             self._followed = agrees or (self._followed and goes_on)
-        self.followed_m = self._followed_last_m = self._going_on(by_width_m, dt_s) or nearest_m
         self._last_m = self.by_width_m = nearest_m
         self._told_m = told_m
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
         return nearest_m if leapt or self._believed_share != 1.0 else told_m
-
-    def _going_on(self, by_width_m: Sequence[float], dt_s: float) -> float | None:
-        """The height by the line that is as wide as the one followed in the frame before."""
-        last_m = self._followed_last_m
-        if last_m is None:
-            return None
-        nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
-        return nearest_m if abs(nearest_m / last_m - 1.0) < LEAP + LEAP_PER_S * dt_s else None
 
     def _change(self, nearest_m: float, share: float) -> float:
         """By how much both what the widths tell and its share of what is told have changed, as a share: then

@@ -173,7 +173,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.HEIGHT_WRONG,
         "width of the seen lines against the map's by more than `hazards.height_share`, or by 0.25 m and"
         " 12 %, or by 8.5 % where their distances and the drone's motion tell the same, for"
-        " `hazards.disagree_s`; from the floor on, too; over once both agree to 10 % for 0.5 s",
+        " `hazards.disagree_s`, less what is climbed within the range finder's 0.1 s and the delay's error;"
+        " from the floor on, too; over once both agree to 10 % for 0.5 s",
         Action.HOLD,
         "no climb by it; land after `mission.lines_land_s`",
         _FAST,

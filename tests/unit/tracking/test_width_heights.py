@@ -76,19 +76,6 @@ def test_a_height_that_leaps_away_from_a_width_is_not_believed_for_one_frame() -
     assert heights.sees([1.58], 1.58) == 1.58
 
 
-def test_the_line_that_is_followed_is_none_that_the_told_height_chooses() -> None:
-    """An echo of 1.3 times the way, over a stripe that is as wide as from there."""
-    heights = Frames()
-    for told_m in (1.6, 1.6, 1.7, 1.85, 2.05, 2.05):
-        heights.sees([1.6, 1.75, 1.9, 2.1], told_m)
-        assert heights.followed_m == 1.6
-    assert heights.by_width_m == 2.1
-    heights.sees([2.1], 2.05)
-    assert heights.followed_m == 2.1
-    heights.sees([], 2.05)
-    assert heights.followed_m is None
-
-
 @pytest.mark.parametrize("climb_mps", [-1.0, 1.0])
 def test_what_a_late_range_finder_tells_in_a_climb_does_not_contradict_the_widths(climb_mps: float) -> None:
     """0.1 s late by itself, over a frame that is 40 ms later than it is thought to be."""
