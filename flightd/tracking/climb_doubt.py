@@ -4,8 +4,8 @@ An autopilot flies by its own climb rate.  Where a door opens or a duct blows, t
 a drone that is to hover climbs while it tells that it does not.  Goods below move the range finder alone, a
 range finder that sticks leaves the width of the lines to change alone: only both together contradict it.
 Where the range finder tells nothing the lines contradict it alone, but only those that are seen for a while:
-over bare floor a seam that shows in a few frames is as wide as a line from another height.  Nor do a few frames
-of a width that goes on from none before count beside it: of all stripes an echo may agree with one.
+over bare floor a seam that shows in a few frames is as wide as a line from another height.  Nor does a width
+count beside it that goes on from none before, for a few frames: of all stripes an echo may agree with one.
 """
 
 from __future__ import annotations
@@ -90,8 +90,8 @@ class ClimbDoubt:
         self._last = None
 
     def _is_strange(self, new: _Sample) -> bool:
-        """Its width is another line's than the one followed, and has not been seen for long.  None is once the
-        climb was found to be wrong: it is put right down to the floor, where no line is followed."""
+        """Its width is another line's than the one followed, and has not been seen for long.  None is once
+        the climb was found to be wrong: it is put right down to the floor, where no line is followed."""
         followed = self._followed
         if not (self.found or followed is None or _goes_on(new, followed)):
             self._strange_ns = self._strange_ns or new.stamp_ns

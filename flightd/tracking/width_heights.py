@@ -21,8 +21,8 @@ of it, within so much on average: a range finder that reads too little from the 
 _OTHER_S = 2.95
 """The same for a line of another width than those before it, of which no range finder can be the cause."""
 _UNMEASURED_M = 0.35
-"""Range finders need not measure less: one that reads its least above a drone that stands, or is hardly up, is
-right, and tells no height."""
+"""Range finders need not measure less: one that reads its least above a drone that stands, or is hardly up,
+is right, and tells no height."""
 _LOW_M, _NOT_LOW_M = 0.5, 0.9
 """Up to here lines are so wide in the picture that they tell its height better than a range finder, which
 lags behind a take-off or measures nothing yet; from there up to there both tell it."""
@@ -33,13 +33,13 @@ finder cannot measure: what its least reading is off from there is no error of t
 _RISES_MPS = 1.5
 """No take-off climbs faster, so near the floor its heights change by no more."""
 _RANGE_LAG_S, _DELAY_SIGMAS = 0.1, 2.0
-"""A range finder tells the height of so long before its stamp at most: what it averages over.  A frame is of so
-many standard deviations of its delay earlier or later at most."""
+"""A range finder tells the height of so long before its stamp at most: what it averages over.  A frame is of
+so many standard deviations of its delay earlier or later at most."""
 
 
 def climbed_between_m(climb_mps: float, delay_sigma_s: float) -> tuple[float, float]:
-    """The least and the most that a vehicle may climb, at that rate (NaN: not known), from when the height was
-    true that its range finder tells of a frame's exposure until the frame was exposed."""
+    """The least and the most that a vehicle may climb, at that rate (NaN: not known), from when the height
+    was true that its range finder tells of a frame's exposure until the frame was exposed."""
     if math.isnan(climb_mps):
         return 0.0, 0.0
     unsure_s = _DELAY_SIGMAS * delay_sigma_s

@@ -47,9 +47,7 @@ class HeightLeapGate:
         self._accepted: _Reading | None = None
         self._leapt: _Reading | None = None
 
-    def accepts(
-        self, height_m: float, distance_m: float, stamp_ns: int, climb_mps: float = math.nan
-    ) -> bool:
+    def accepts(self, height_m: float, distance_m: float, stamp_ns: int, climb_mps: float = math.nan) -> bool:
         """Take the height that was measured then as that distance along the body; whether it is believed.
         `climb_mps` is the climb rate that is told, NaN where none is."""
         new, leapt = _Reading(height_m, distance_m, stamp_ns), self._leapt
