@@ -25,8 +25,6 @@ _AGREEING_M, _AGREEING_SHARE = 0.12, 0.25
 _ALONE_NS, _GAP_NS = 400_000_000, 150_000_000
 """So long lines have to be seen to tell anything alone, in frames no further apart; beside the range finder,
 lines as wide as none that was followed."""
-_LEAP_NS = 100_000_000
-"""A width goes on from an older one by no more than it may change within so long."""
 _ALONE_M = 1.75
 """From so high on what they contradict alone counts for less: a width is noisy by a share of the height."""
 _RATE_NS, _HELD_NS = 300_000_000, 500_000_000
@@ -115,7 +113,8 @@ class ClimbDoubt:
 
 
 def _goes_on(new: _Sample, last: _Sample) -> bool:
-    since_ns = min(new.stamp_ns - last.stamp_ns, _LEAP_NS)
+    """Its width is that of the other one, which may be older than a gap: what changed since is not known."""
+    since_ns = min(new.stamp_ns - last.stamp_ns, _GAP_NS)
     return abs(new.width_m / last.width_m - 1.0) < LEAP + LEAP_PER_S * since_ns * 1e-9
 
 
