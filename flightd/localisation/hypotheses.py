@@ -92,9 +92,14 @@ class Places:
     def agreed(self, axis: int, track_id: int) -> float:
         """How likely the track is a map line as far from the drone as at the likeliest place."""
         index = self._matches[axis][track_id]
-        off_m = self._paint.axes[axis].at_m[index] - self.at_m[:, axis]
+        off_m = self._lines_m(axis, index) - self.at_m[:, axis]
         agree = (index >= 0) & (np.abs(off_m - off_m[self.best]) < _ALIKE_M)
         return float(self.weights[agree].sum())
+
+    def _lines_m(self, axis: int, index: Indices) -> Matrix:
+        """Where these map lines are, of any where the index says that there is none."""
+        at_m = self._paint.axes[axis].at_m
+        return at_m[np.maximum(index, 0)] if len(at_m) else np.zeros(len(index))
 
     def unmatched(self, axis: int, track_id: int) -> bool:
         """Whether at some place the track may still turn out to be a map line."""
@@ -127,7 +132,6 @@ class Places:
             del matches[gone], self._found[axis][gone]
         if not matches:
             return
-        lines = self._paint.axes[axis].at_m
         weight: Matrix = np.zeros(len(self))
         total: Matrix = np.zeros(len(self))
         for id_, index in matches.items():
@@ -135,7 +139,7 @@ class Places:
             told = 1.0 / (track.sigma_m**2 + _SURVEY_SIGMA_M**2)
             share = np.where(index >= 0, told, 0.0)
             weight += share
-            total += share * (lines[index] - track.offset_m)
+            total += share * (self._lines_m(axis, index) - track.offset_m)
         there = (weight > 0.0).nonzero()[0]
         weight = weight[there]
         self.at_m[there, axis] = total[there] / weight
@@ -180,7 +184,9 @@ class Places:
         seen = taken.copy()
         for id_, already in matches.items():
             if id_ != track.id:
-                held = (already >= 0)[:, None] & (lines.at_m[already][:, None] == lines.at_m[None, :])
+                held = (already >= 0)[:, None] & (
+                    self._lines_m(axis, already)[:, None] == lines.at_m[None, :]
+                )
                 taken |= held
                 if id_ in beside:
                     seen |= held
@@ -218,8 +224,8 @@ class Places:
         shares = np.concatenate([false, rival[also, others]])
         lines = np.concatenate([np.full(len(rows), _FALSE), others])
         first = self._matches[axis][track_id][parents]
-        known = self._known[axis][parents] & (at_m[None, :] != at_m[first][:, None])
-        known |= (lines >= 0)[:, None] & (at_m[None, :] == at_m[lines][:, None])
+        known = self._known[axis][parents] & (at_m[None, :] != self._lines_m(axis, first)[:, None])
+        known |= (lines >= 0)[:, None] & (at_m[None, :] == self._lines_m(axis, lines)[:, None])
         weights = self._joint[parents] * shares
         self._joint[rows] *= 1.0 - false
         self._take(np.concatenate([np.arange(size), parents]))

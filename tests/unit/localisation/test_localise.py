@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import pytest
+
 from flightd.core.camera_view import FloorReach
 from flightd.core.tracks import TrackedLine, TrackSet
 from flightd.localisation.grid_localiser import GridLocaliser
 from flightd.sim.random_sites import random_site
+from flightd.site.site import PaintedLine
 
 SITE = random_site(3)
 A1, A2 = SITE.nodes["A1"], SITE.nodes["A2"]
@@ -79,6 +82,19 @@ def test_of_two_lines_close_beside_each_other_the_one_seen_first_need_not_be_the
         pose = localiser.step(tracks(tick, seen, [line(0, 0.0)], vx=0.8 if x < gap else 0.0), 1.6)
     assert abs(pose.x_m - A2.x_m) < 0.02, "it flew on along the line 13 cm before the true one"
     assert localiser.map_lines(0).keys() == {2}
+
+
+@pytest.mark.parametrize("painted", [0, 1])
+def test_false_lines_across_an_axis_that_hardly_has_one_are_none_of_the_map(painted: int) -> None:
+    along = [PaintedLine(-1.0, 0.0, 9.0, 0.0, SITE.line_width_m)]
+    across = [PaintedLine(0.0, -1.0, 0.0, 1.0, SITE.line_width_m)] * painted
+    localiser = GridLocaliser(replace(SITE, lines=(*along, *across)), "A1", FloorReach())
+    for tick in range(1, 200):
+        x = 0.004 * tick
+        seen = [replace(line(i, at - x), seen_ns=tick * TICK_NS) for i, at in enumerate((0.12, 0.3, 0.7))]
+        pose = localiser.step(tracks(tick, seen, [line(0, 0.0)], vx=0.2), 1.6)
+    assert abs(pose.x_m - x) < 0.5
+    assert abs(pose.y_m) < 0.05
 
 
 def test_a_worn_floor_is_learnt_and_the_place_on_it_stays_known() -> None:
