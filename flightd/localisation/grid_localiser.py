@@ -32,7 +32,7 @@ from flightd.core.tracks import TrackedLine, TrackSet
 from flightd.core.types import GridPose
 from flightd.localisation.hypotheses import Places
 from flightd.localisation.junction_landmarks import Landmark, LandmarkBook
-from flightd.localisation.line_runs import LineRuns
+from flightd.localisation.line_runs import BESIDE_M, Approached, LineRuns
 from flightd.localisation.observation_model import (
     SensorModel,
     crossing_likelihood,
@@ -55,10 +55,8 @@ _JUDGE_NS = 100_000_000
 """What was passed and what is left to match is looked at so often."""
 _SWITCH = 1.5
 """Another place is believed when it is so much likelier."""
-_BESIDE_M = 0.3
-"""Lines so close are taken for each other."""
 _BELOW = 0.3
-"""Part of the height within which a line is below the drone."""
+"""Part of the height within which a line is below the drone, and what lies beside it in view."""
 _SEEN_NS = 200_000_000
 """A line seen so lately counts as in view."""
 _CARRIED_NS = 400_000_000
@@ -94,7 +92,7 @@ class GridLocaliser:
         self._places = Places(self._paint, self._model, self._params.elsewhere)
         self._marks = LandmarkBook()
         self._fixes = FixBook(site)
-        self._passed: list[set[int]] = [set(), set()]
+        self._approached = Approached(), Approached()
         self._runs = LineRuns(), LineRuns()
         self._judged: tuple[list[float], list[float]] = ([], [])
         self._seen_ns = [0, 0]
@@ -134,13 +132,13 @@ class GridLocaliser:
 
     def map_lines(self, axis: int) -> dict[int, float]:
         """Where on the map (m, across the axis) each track is that is surely a line of it, seen from the
-        likeliest place: wherever else the drone may be, the line there lies as far from it.  Lines that were
-        below the drone: had there been another one beside it, it would have been seen."""
+        likeliest place: wherever else the drone may be, the line there lies as far from it.  Lines that the
+        drone came nearer to: another one beside it would have come into view."""
         places = self._places
         return {
             track: float(self._paint.axes[axis].at_m[line])
             for track, line in places.lines(axis).items()
-            if line >= 0 and track in self._passed[axis] and places.agreed(axis, track) > _SURE
+            if line >= 0 and self._approached[axis].has(track) and places.agreed(axis, track) > _SURE
         }
 
     def way_out(self, least: float = 1e-3) -> tuple[float, float] | None:
@@ -169,11 +167,7 @@ class GridLocaliser:
             self._match(axis, lines, reach_m, due)
             places.settle(axis, lines)
             self._carry(axis, tracks, dt_s)
-            self._passed[axis] = {
-                line.id
-                for line in lines
-                if line.id in self._passed[axis] or abs(line.offset_m) < _BELOW * height_m
-            }
+            self._approached[axis].step(lines, _BELOW * height_m)
         if tracks.junctions_ns > self._junctions_ns:
             self._junctions_ns = tracks.junctions_ns
             self._see(tracks, height_m)
@@ -243,7 +237,7 @@ class GridLocaliser:
                     apart_m = abs(other.offset_m - track.offset_m)
                     if (
                         other.id in in_view - {track.id}
-                        and apart_m < _BESIDE_M
+                        and apart_m < BESIDE_M
                         and places.knows(axis, other.id)
                     ):
                         places.contest(axis, track, other)

@@ -1,7 +1,9 @@
-"""How much of each line has come into view: paint that the map has goes on, any other soon ends."""
+"""How much of each line, and of the floor beside it, has come into view: paint that the map has goes on, any
+other soon ends; and of two close beside each other the farther one shows later."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from flightd.core.tracks import TrackedLine
@@ -10,6 +12,8 @@ _SEEN_NS = 200_000_000
 """A line seen so lately is in view where its track says."""
 _LEAP_M = 0.5
 """What is in view does not grow by more at once: the place was corrected, or the line was refound."""
+BESIDE_M = 0.3
+"""Lines so close are taken for each other."""
 
 
 class LineRuns:
@@ -39,3 +43,23 @@ class LineRuns:
             if known is not None:
                 self._runs_m[track.id] = known
         return grown
+
+
+class Approached:
+    """Which tracks across one axis the drone came nearer to by as much as lines are taken for each other, or
+    had below it: what lies so close beyond them has come into view."""
+
+    def __init__(self) -> None:
+        self._far_m: dict[int, float] = {}
+
+    def has(self, track: int) -> bool:
+        return self._far_m.get(track) == math.inf
+
+    def step(self, tracks: Sequence[TrackedLine], below_m: float) -> None:
+        """Now they are there; those within `below_m` are below the drone."""
+        before, self._far_m = self._far_m, {}
+        for track in tracks:
+            away_m = abs(track.offset_m)
+            far_m = max(before.get(track.id, 0.0), away_m)
+            near = away_m < below_m or far_m - away_m > BESIDE_M
+            self._far_m[track.id] = math.inf if near else far_m
