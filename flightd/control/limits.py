@@ -23,7 +23,8 @@ class Surroundings:
     pictures or attitude, either tells enough to come to rest by.  `at_once`: an emergency stop is not kept
     waiting by the rates.  `climb_error_mps`: the vehicle takes its climb for so much more than it is.
     `most_lean_rad`: the lean as a whole is no greater, whatever each axis is allowed.  `haste`: the share of
-    the configured tilt rate and jerk that it may change by."""
+    the configured tilt rate and jerk that it may change by, unless it comes to level by stale data or back
+    into the corridor."""
 
     headroom_m: float = math.inf
     back: tuple[float, float] | None = None
@@ -56,7 +57,8 @@ class Limiter:
         limits, last = self._limits, self._last
         dt_s = min(max((wanted.stamp_ns - last.stamp_ns) * 1e-9, 0.0), _GAP_S)
         roll, pitch, yaw_rate = wanted.roll_rad, wanted.pitch_rad, wanted.yaw_rate_radps
-        if around.at_once or not around.data_age_s <= limits.expert.stale_s:  # NaN is stale, too
+        stale = not around.data_age_s <= limits.expert.stale_s  # NaN is stale, too
+        if around.at_once or stale:
             roll = pitch = yaw_rate = 0.0
         share = min(1.0, around.most_lean_rad / (math.hypot(roll, pitch) or 1.0))
         roll, pitch = _clamp(share * roll, limits.max_tilt_rad), _clamp(share * pitch, limits.max_tilt_rad)
@@ -65,7 +67,7 @@ class Limiter:
             most = max(abs(roll), abs(pitch), limits.max_tilt_rad) / limits.max_tilt_rad
             roll, pitch = roll / most, pitch / most
         if not around.at_once:
-            roll, pitch = self._swing(roll, pitch, around.haste * dt_s)
+            roll, pitch = self._swing(roll, pitch, dt_s if stale or around.back else around.haste * dt_s)
             yaw_rate = last.yaw_rate_radps + _clamp(
                 yaw_rate - last.yaw_rate_radps, limits.expert.max_yaw_accel_radps2 * dt_s
             )

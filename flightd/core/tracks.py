@@ -21,12 +21,12 @@ class TrackedLine:
     from_m: float = 0.0
     to_m: float = 0.0
 
-    def moved(self, across_m: float, along_m: float) -> TrackedLine:
-        """The line as the drone sees it after moving so far across it and along it."""
+    def moved(self, across_m: float, along_m: float, sigma_m: float = 0.0) -> TrackedLine:
+        """The line as the drone sees it after moving so far across it, known to `sigma_m`, and along it."""
         return TrackedLine(
             self.id,
             self.offset_m - across_m,
-            self.sigma_m,
+            math.hypot(self.sigma_m, sigma_m),
             self.width_m,
             self.seen_ns,
             self.hits,

@@ -55,6 +55,8 @@ _JUDGE_NS = 100_000_000
 """What was passed and what is left to match is looked at so often."""
 _SWITCH = 1.5
 """Another place is believed when it is so much likelier."""
+_MOST_AT_ONCE = 4
+"""Times the places that are kept there may be until the next look at what was passed."""
 _BELOW = 0.3
 """Part of the height within which a line is below the drone, and what lies beside it in view."""
 _SEEN_NS = 200_000_000
@@ -65,6 +67,8 @@ _SURE = 0.99
 """Places this likely together say how far a line of the map is."""
 _CREEP_MPS = 0.1
 """A hover counts as so fast: what carries a position drifts at rest, too."""
+_OTHER_FLOOR = 5e-3
+"""Probability, at each new node, that the floor is as worn from here on as any may be."""
 _GAP_S = 0.6
 """Without a line for so long, the count may have slipped."""
 
@@ -134,11 +138,16 @@ class GridLocaliser:
         """Where on the map (m, across the axis) each track is that is surely a line of it, seen from the
         likeliest place: wherever else the drone may be, the line there lies as far from it.  Lines that the
         drone came nearer to: another one beside it would have come into view."""
-        places = self._places
+        lines = {
+            track: line
+            for track, line in self._places.lines(axis).items()
+            if line >= 0 and self._approached[axis].has(track)
+        }
+        agreed = self._places.agreed(axis, lines)
         return {
             track: float(self._paint.axes[axis].at_m[line])
-            for track, line in places.lines(axis).items()
-            if line >= 0 and self._approached[axis].has(track) and places.agreed(axis, track) > _SURE
+            for track, line in lines.items()
+            if agreed[track] > _SURE
         }
 
     def way_out(self, least: float = 1e-3) -> tuple[float, float] | None:
@@ -241,6 +250,9 @@ class GridLocaliser:
                         and places.knows(axis, other.id)
                     ):
                         places.contest(axis, track, other)
+                places.settle(axis, tracks)  # the next one is looked for from there
+                if len(places) > _MOST_AT_ONCE * self._params.most_places:
+                    places.thin(self._params.most_places)
                 index = places.matched(axis, track.id)
             else:
                 if due and places.unmatched(axis, track.id):
@@ -339,7 +351,7 @@ class GridLocaliser:
             (float(here[0]) + nodes[other].x_m - node.x_m, float(here[1]) + nodes[other].y_m - node.y_m)
             for other in self._site.neighbours(self._node)
         ]
-        places.doubt(self._params.elsewhere)
+        places.doubt(self._params.elsewhere, _OTHER_FLOOR)
         places.add(at_m, [weight] * len(at_m), max(0.05, float(places.sigma_m[places.best].max())))
 
     def _fix(self, x_m: float, y_m: float, sigma_m: float) -> None:

@@ -75,7 +75,8 @@ class Places:
     def floor(self) -> Matrix:
         """(C) the probability of each state of the floor where the likeliest place is the true one."""
         here: Matrix = self._joint[self.best]
-        return here / max(float(here.sum()), _TINY)
+        total = float(here.sum())
+        return here / total if total > _TINY else self._model.floor_prior
 
     def matched(self, axis: int, track_id: int) -> Indices:
         """(N) indices of the map lines that the track is, negative where it is none."""
@@ -89,17 +90,19 @@ class Places:
         """The map line of each track at the likeliest place, negative where it is none."""
         return {track: int(index[self.best]) for track, index in self._matches[axis].items()}
 
-    def agreed(self, axis: int, track_id: int) -> float:
-        """How likely the track is a map line as far from the drone as at the likeliest place."""
-        index = self._matches[axis][track_id]
+    def agreed(self, axis: int, tracks: Collection[int]) -> dict[int, float]:
+        """How likely each of these tracks is a map line as far from the drone as at the likeliest place."""
+        if not tracks:
+            return {}
+        index = np.stack([self._matches[axis][track] for track in tracks])
         off_m = self._lines_m(axis, index) - self.at_m[:, axis]
-        agree = (index >= 0) & (np.abs(off_m - off_m[self.best]) < _ALIKE_M)
-        return float(self.weights[agree].sum())
+        agree = (index >= 0) & (np.abs(off_m - off_m[:, [self.best]]) < _ALIKE_M)
+        return dict(zip(tracks, (agree @ self.weights).tolist(), strict=True))
 
     def _lines_m(self, axis: int, index: Indices) -> Matrix:
         """Where these map lines are, of any where the index says that there is none."""
         at_m = self._paint.axes[axis].at_m
-        return at_m[np.maximum(index, 0)] if len(at_m) else np.zeros(len(index))
+        return at_m[np.maximum(index, 0)] if len(at_m) else np.zeros(index.shape)
 
     def unmatched(self, axis: int, track_id: int) -> bool:
         """Whether at some place the track may still turn out to be a map line."""
@@ -108,6 +111,7 @@ class Places:
     def strange(self, axis: int, tracks: Sequence[TrackedLine], offset_m: float) -> Flags:
         """(N) where what is tracked `offset_m` from the drone is no line of the map."""
         flags: Flags = np.zeros(len(self), dtype=bool)
+        flags[0] = True
         for track in tracks:
             if track.id in self._matches[axis] and abs(track.offset_m - offset_m) < _SAME_M:
                 flags |= self._matches[axis][track.id] < 0
@@ -152,9 +156,12 @@ class Places:
         self._joint = self._joint * factors
         self._joint /= self._joint.sum()
 
-    def doubt(self, weight: float) -> None:
-        """Give elsewhere so much more."""
+    def doubt(self, weight: float, other_floor: float) -> None:
+        """Give elsewhere so much more, and with the probability `other_floor` let it be any floor from here
+        on."""
+        self._joint += other_floor * (self.weights[:, None] * self._model.floor_prior - self._joint)
         self._joint[0] += weight * self._model.floor_prior
+        self._joint /= self._joint.sum()
 
     def match(
         self, axis: int, track: TrackedLine, beside: Collection[int], reach_m: float, judge: bool
@@ -179,7 +186,9 @@ class Places:
         best = apart.argmin(axis=1)
         found = apart[rows, best]
         other = np.abs(lines.at_m[None, :] - lines.at_m[best][:, None])
-        gate = _MATCH_SIGMAS * sigma + _MATCH_SLACK_M
+        fits = (index == _UNMATCHED) & (found <= _MATCH_SIGMAS * sigma + _MATCH_SLACK_M)
+        if not (judge or fits.any()):
+            return
         taken = np.zeros((len(self), len(lines.at_m)), dtype=bool)
         seen = taken.copy()
         for id_, already in matches.items():
@@ -190,9 +199,7 @@ class Places:
                 taken |= held
                 if id_ in beside:
                     seen |= held
-        new = (index == _UNMATCHED) & (found <= gate) & ~taken[rows, best]
-        if not (judge or new.any()):
-            return
+        new = fits & ~taken[rows, best]
         model = self._model
         density = line_density(model, residual, sigma, covered & ~seen)
         told = model.line_seen * density.max(axis=1)[:, None] + model.false_line_per_m
@@ -212,6 +219,8 @@ class Places:
         rival = np.where((other > 1e-6) & ~taken, density, 0.0)[moved]
         share = model.line_seen * rival[:, :, None] / told[moved][:, None, :]
         share[share.max(axis=2) < _RIVAL] = 0.0
+        if not judge:  # it was weighed before, as a line that is none of the map
+            self._joint[moved] /= 1.0 + share.sum(axis=1)
         self._branch(axis, track.id, moved, model.false_line_per_m / told[moved], share)
 
     def _branch(self, axis: int, track_id: int, rows: Indices, false: Matrix, rival: Matrix) -> None:
@@ -231,6 +240,8 @@ class Places:
         self._take(np.concatenate([np.arange(size), parents]))
         self._joint[size:] = weights
         self._matches[axis][track_id][size:] = lines
+        beyond = self._lines_m(axis, lines) - self._lines_m(axis, first)
+        self._found[axis][track_id][size:, 0] += np.where(lines >= 0, beyond, 0.0)
         self._known[axis][size:] = known
         self._joint /= self._joint.sum()
 

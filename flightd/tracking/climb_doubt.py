@@ -73,7 +73,7 @@ class ClimbDoubt:
         else:
             unsure = self._is_strange(new)
         if unsure:
-            self._noticed = self.found
+            self._noticed = self.found or (self._noticed and not alone)
             return
         off_m = _most_off_m(new, samples)
         if alone:

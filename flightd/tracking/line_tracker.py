@@ -44,8 +44,10 @@ from flightd.tracking.motion_model import (
     MOUNT_YAW,
     PITCH,
     PSI,
+    PUSH,
     ROLL,
     SCALE,
+    VELOCITY,
     VX,
     VY,
     Told,
@@ -67,6 +69,8 @@ _FARTHEST = 3.0
 _WATCHED_NS = 10_000_000_000
 """For so long without a line the drift of gyros stays within degrees."""
 _HARDLY_RISEN_M = 0.5
+_STANDING_MPS = 0.15
+"""Sigma of the speed of what stands or has hardly risen."""
 _ASSUMED_TILT_RAD = math.radians(2.0)
 _RATE_NS = 20_000_000
 """The told attitude's rates are taken over so long before and after."""
@@ -292,6 +296,9 @@ class LineTracker:
         yaw = wrap_pi(newest.yaw_rad + held.mean(PSI))
         known_ns = now_ns - self._forget_ns
         vx, vy, moved_x, moved_y, ax, ay = self._carried_to(now_ns)
+        ahead_s = (now_ns - self._stamp_ns) * 1e-9
+        sigmas = self._speed_sigma(0, ahead_s), self._speed_sigma(1, ahead_s)
+        off_x, off_y = (sigma * ahead_s for sigma in sigmas)
         return TrackSet(
             now_ns,
             self._lines_ns,
@@ -301,8 +308,12 @@ class LineTracker:
             vy,
             ax,
             ay,
-            tuple(line.moved(moved_x, moved_y) for line in self._lines(0) if self._stamp_ns > known_ns),
-            tuple(line.moved(moved_y, moved_x) for line in self._lines(1) if self._stamp_ns > known_ns),
+            tuple(
+                line.moved(moved_x, moved_y, off_x) for line in self._lines(0) if self._stamp_ns > known_ns
+            ),
+            tuple(
+                line.moved(moved_y, moved_x, off_y) for line in self._lines(1) if self._stamp_ns > known_ns
+            ),
             tuple(pad.moved(moved_x, moved_y) for pad in self._pads),
             self._stamp_ns,
             tuple(seen.moved(moved_x, moved_y) for seen in self._junctions),
@@ -312,7 +323,7 @@ class LineTracker:
             push_y_mps2=held.push_after(1, (now_ns - self._stamp_ns) * 1e-9),
             markers=tuple(mark.moved(moved_x, moved_y) for mark in self._markers),
             features_ns=(self._features_ns[0], self._features_ns[1]),
-            velocity_sigma_mps=(held.sigma(VX), held.sigma(VY)),
+            velocity_sigma_mps=sigmas,
         )
 
     def survey(self, axis: int, places_m: Mapping[int, float], sigma_m: float) -> None:
@@ -386,6 +397,12 @@ class LineTracker:
             for seen, point in zip(lines.features, points, strict=bool(points))
             if math.hypot(*point) < _FARTHEST * height_m
         ]
+
+    def _speed_sigma(self, axis: int, ahead_s: float) -> float:
+        """Of the speed along an axis so long after the newest frame: the push on it may change meanwhile."""
+        if self._stands:
+            return _STANDING_MPS
+        return math.hypot(self._filter.sigma(VELOCITY[axis]), self._filter.sigma(PUSH[axis]) * ahead_s)
 
     def _lines(self, axis: int) -> list[TrackedLine]:
         """All lines held across an axis, nearest to the drone first."""

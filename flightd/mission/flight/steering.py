@@ -20,8 +20,9 @@ _LOW_M, _LOW_LEAN_RAD = 0.5, math.radians(5.0)
 """Below this height a landing leans by no more: it may stand already, which is known a second later."""
 
 _LEAST_HASTE = 0.4
-"""While it is not known how late pictures are against the attitude, a lean that changes fast makes the lines
-seem to move: it changes by no less than this share of what is configured."""
+"""Where pictures and what answers them are late, or may be later than is known, a lean that changes fast
+makes lines seem to move: whoever steers by them changes it by no less than this share of what is
+configured."""
 
 
 class Steering:
@@ -82,7 +83,7 @@ class Steering:
             at_once=guidance.at_once,
             most_lean_rad=_LOW_LEAN_RAD if self._lands_low else math.inf,
             climb_error_mps=inputs.warnings.climb_error_mps,
-            haste=max(conditions.ease**2, _LEAST_HASTE),
+            haste=max(conditions.ease**2, _LEAST_HASTE) if guidance.guide is Guide.STEER else 1.0,
         )
         return self._limiter.apply(wanted, around)
 

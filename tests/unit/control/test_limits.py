@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -41,6 +42,18 @@ AROUND = [
     Surroundings(data_age_s=9.0),
     Surroundings(haste=0.4),
 ]
+
+
+@pytest.mark.parametrize("around", [Surroundings(data_age_s=9.0), Surroundings(back=(1.0, 0.0))])
+def test_what_comes_to_level_or_back_into_the_corridor_is_not_kept_waiting_by_late_pictures(
+    around: Surroundings,
+) -> None:
+    limiter = Limiter(LIMITS)
+    leaning = stream([(0.0, 0.15, 0.0, 0.0, 20)] * 40, Surroundings(), limiter)[-1]
+    assert leaning.pitch_rad == pytest.approx(0.15)
+    level = AttitudeSetpoint(leaning.stamp_ns + STEP_NS)
+    slow = limiter.apply(level, replace(around, haste=0.4))
+    assert leaning.pitch_rad - slow.pitch_rad > 0.9 * EXPERT.max_jerk_mps3 * 0.02 / GRAVITY_MPS2
 
 
 @given(wishes, st.sampled_from(AROUND))

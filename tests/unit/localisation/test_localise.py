@@ -116,8 +116,10 @@ def test_on_a_kept_floor_a_slip_by_a_cell_is_not_taken_for_wear() -> None:
     along = [SITE.nodes[f"A{i}"].x_m for i in range(2, 7)]
     for tick in range(1, 700):
         x = min(A2.x_m + tick * 0.02 * 0.8, along[-1])
-        seen = [line(i, at - x) for i, at in enumerate(along) if abs(at - x) < 0.9]
-        pose = localiser.step(tracks(tick, seen, [line(0, 0.0)], vx=0.8 if x < along[-1] else 0.0), 1.6)
+        near = [(i, at - x) for i, at in enumerate(along) if abs(at - x) < 0.9]
+        seen = [replace(line(*one), seen_ns=tick * TICK_NS) for one in near]
+        below = replace(line(0, 0.0), seen_ns=tick * TICK_NS)
+        pose = localiser.step(tracks(tick, seen, [below], vx=0.8 if x < along[-1] else 0.0), 1.6)
         wrong = abs(pose.x_m - x) > 0.5
         assert not (wrong and pose.integrity > 0.99), "started one node further than it was told"
 
@@ -127,8 +129,10 @@ def test_only_a_line_that_lay_below_says_where_on_the_map_it_is() -> None:
     along = [SITE.nodes[f"A{i}"].x_m for i in range(1, 5)]
     for tick in range(1, 250):
         x = min(tick * 0.02 * 0.8, along[2])
-        seen = [line(i, at - x) for i, at in enumerate(along) if abs(at - x) < 2.2]
-        localiser.step(tracks(tick, seen, [line(0, 0.0)], vx=0.8 if x < along[2] else 0.0), 1.6)
+        near = [(i, at - x) for i, at in enumerate(along) if abs(at - x) < 2.2]
+        seen = [replace(line(*one), seen_ns=tick * TICK_NS) for one in near]
+        below = replace(line(0, 0.0), seen_ns=tick * TICK_NS)
+        localiser.step(tracks(tick, seen, [below], vx=0.8 if x < along[2] else 0.0), 1.6)
     assert localiser.map_lines(0) == {1: along[1], 2: along[2]}, "the fourth is in view, ahead"
 
 
@@ -204,6 +208,17 @@ def after_lines(features: Callable[[int], tuple[bool, bool]], ticks: int = 200) 
         seen = replace(tracks(tick, here, here), features_ns=(last[0], last[1]), pads_ns=now_ns)
         localiser.step(seen, 1.6)
     return localiser, now_ns
+
+
+def test_two_lines_that_come_into_view_at_once_after_a_gap_are_two_of_the_map() -> None:
+    localiser, gap = GridLocaliser(SITE, "A1", FloorReach()), A2.x_m - A1.x_m
+    localiser.step(tracks(1, [line(0, 0.0)], [line(0, 0.0)]), 1.6)
+    blind = replace(tracks(201, [], [line(0, 0.0)]), velocity_sigma_mps=(0.2, 0.02))
+    localiser.step(blind, 1.6)
+    for tick in range(202, 260):
+        both = [replace(line(i, at), seen_ns=tick * TICK_NS) for i, at in ((1, -0.3), (2, gap - 0.3))]
+        pose = localiser.step(tracks(tick, both, [line(0, 0.0)]), 1.6)
+    assert abs(pose.x_m - 0.3) < 0.02
 
 
 def test_once_nothing_told_the_position_features_do_not_take_it_up_again() -> None:

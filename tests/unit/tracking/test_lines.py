@@ -75,6 +75,15 @@ def test_velocity_and_offsets_are_those_of_now_although_pictures_are_late(tilt_d
     assert any(abs(track.offset_m) < 0.01 for track in tracks.across_y), "the aisle line below"
 
 
+def test_while_no_picture_comes_the_doubt_of_motion_and_lines_grows() -> None:
+    tracker, _, now_ns = flown(0.0, 2.0)
+    seen, later = tracker.at(now_ns), tracker.at(now_ns + 2 * 10**9)
+    assert seen is not None
+    assert later is not None
+    assert min(later.velocity_sigma_mps) > 3.0 * max(seen.velocity_sigma_mps)
+    assert min(line.sigma_m for line in later.across_x + later.across_y) > 0.1
+
+
 def test_the_vehicles_own_heading_may_start_anywhere() -> None:
     tracker, _, now_ns = flown(0.0, 1.0, yaw_offset_rad=2.3)
     tracks = tracker.at(now_ns)
