@@ -49,6 +49,8 @@ class Trial:
     """Keys of its section."""
     limit_s: float = 100.0
     """Until when it is flown, what waits without an end a little longer than until it waits."""
+    or_ends: Phase | None = None
+    """How it may end as well."""
 
 
 def fault(**values: object) -> Callable[[IdealFlight], None]:
@@ -150,7 +152,7 @@ TRIALS: dict[str, Trial] = {
     "detector_killed": Trial(fault(health=Health(0.08, 1)), ends=Phase.DONE, found_s=0.05),
     "detector_hung": Trial(fault(health=Health(0.08, 2)), ends=Phase.DONE, found_s=0.05),
     "overload": Trial(fault(health=Health(0.4)), found_s=3.2),
-    "swings": Trial(ring, found_s=12.0),
+    "swings": Trial(ring, found_s=12.0, or_ends=Phase.DONE),  # the gains that it lowers may calm it
     "clock_jump": Trial(fault(stamps_refused=40), ends=Phase.DONE, found_s=0.05),
     "loop_stalled": Trial(fault(stall_ns=400_000_000), ends=Phase.DONE, found_s=0.45),
     "clock_unsure": Trial(
@@ -215,7 +217,7 @@ def test_a_hazard_is_found_answered_and_ends_safely(name: str, seed: int) -> Non
     if row.action is Action.HANDS_OFF:
         assert flown.phase is Phase.PILOT
         return
-    assert flown.phase is trial.ends, flown.reason
+    assert flown.phase in {trial.ends, trial.or_ends}, flown.reason
     truth = [k for _, k in flown.truth]
     assert truth[-1].height_m < 0.2
     assert min(map(shelf_distance_m, truth)) > BODY_M
