@@ -22,7 +22,7 @@ the discrete Bayes filter of Thrun, Burgard, Fox: Probabilistic Robotics, 2005, 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from flightd.core.tracks import TrackedLine, TrackSet
 from flightd.core.types import GridPose
 from flightd.localisation.hypotheses import Places
 from flightd.localisation.junction_landmarks import Landmark, LandmarkBook
-from flightd.localisation.line_runs import BESIDE_M, Approached, LineRuns
+from flightd.localisation.line_runs import BESIDE_M, SEEN_NS, Approached, LineRuns
 from flightd.localisation.observation_model import (
     SensorModel,
     crossing_likelihood,
@@ -59,8 +59,6 @@ _MOST_AT_ONCE = 4
 """Times the places that are kept there may be until the next look at what was passed."""
 _BELOW = 0.3
 """Part of the height within which a line is below the drone, and what lies beside it in view."""
-_SEEN_NS = 200_000_000
-"""A line seen so lately counts as in view."""
 _CARRIED_NS = 400_000_000
 """So lately features of the floor must have been followed to carry a position on."""
 _SURE = 0.99
@@ -204,7 +202,7 @@ class GridLocaliser:
         """Count how far features of the floor have carried the position on since a line told it.  Once
         neither tells it, only a line does again."""
         seen_ns, features_ns = self._seen_ns[axis], tracks.features_ns[axis]
-        if tracks.pads_ns - seen_ns < _SEEN_NS:
+        if tracks.pads_ns - seen_ns < SEEN_NS:
             self._carried_m[axis] = 0.0
         elif tracks.stamp_ns - max(self._told_ns[axis], seen_ns) > _CARRIED_NS:
             self._carried_m[axis] = math.inf
@@ -228,38 +226,36 @@ class GridLocaliser:
         self._places.best = 1
 
     def _match(self, axis: int, tracks: Sequence[TrackedLine], reach_m: float, due: bool) -> None:
-        places, judged = self._places, self._judged[axis]
+        places = self._places
         newest_ns = max((track.seen_ns for track in tracks), default=0)
-        in_view = {track.id for track in tracks if newest_ns - track.seen_ns < _SEEN_NS}
+        in_view = {track.id: track for track in tracks if newest_ns - track.seen_ns < SEEN_NS}
         for track in sorted(tracks, key=lambda t: -t.seen_ns):
             if track.hits < _MIN_HITS:
                 continue
-            try:
-                index = places.matched(axis, track.id)
-            except KeyError:
-                at_m = float(places.at_m[places.best, axis]) + track.offset_m
-                judge = all(abs(at_m - other) > 0.15 for other in judged)
-                if judge:
-                    judged.append(at_m)
-                places.match(axis, track, in_view, reach_m, judge)
-                for other in tracks:
-                    apart_m = abs(other.offset_m - track.offset_m)
-                    if (
-                        other.id in in_view - {track.id}
-                        and apart_m < BESIDE_M
-                        and places.knows(axis, other.id)
-                    ):
-                        places.contest(axis, track, other)
+            if not places.knows(axis, track.id):
+                self._match_new(axis, track, in_view, reach_m)
                 places.settle(axis, tracks)  # the next one is looked for from there
                 if len(places) > _MOST_AT_ONCE * self._params.most_places:
                     places.thin(self._params.most_places)
-                index = places.matched(axis, track.id)
-            else:
-                if due and places.unmatched(axis, track.id):
-                    places.match(axis, track, in_view, reach_m, judge=False)
-            if index[places.best] >= 0:
+            elif due and places.unmatched(axis, track.id):
+                places.match(axis, track, in_view, reach_m, judge=False)
+            if places.matched(axis, track.id)[places.best] >= 0:
                 self._ever_matched[axis] = True
                 self._seen_ns[axis] = max(self._seen_ns[axis], track.seen_ns)
+
+    def _match_new(
+        self, axis: int, track: TrackedLine, in_view: Mapping[int, TrackedLine], reach_m: float
+    ) -> None:
+        places, judged = self._places, self._judged[axis]
+        at_m = float(places.at_m[places.best, axis]) + track.offset_m
+        judge = all(abs(at_m - other) > 0.15 for other in judged)
+        if judge:
+            judged.append(at_m)
+        places.match(axis, track, in_view, reach_m, judge)
+        for other in in_view.values():
+            beside = other is not track and abs(other.offset_m - track.offset_m) < BESIDE_M
+            if beside and places.knows(axis, other.id):
+                places.contest(axis, track, other)
 
     def _see(self, tracks: TrackSet, height_m: float) -> None:
         """Weigh the places by junctions that have become sure."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from flightd.core.tracks import TrackedLine
 
-_SEEN_NS = 200_000_000
+SEEN_NS = 200_000_000
 """A line seen so lately is in view where its track says."""
 _LEAP_M = 0.5
 """What is in view does not grow by more at once: the place was corrected, or the line was refound."""
@@ -31,7 +31,7 @@ class LineRuns:
         runs, self._runs_m = self._runs_m, {}
         for track in tracks:
             known = runs.get(track.id)
-            if now_ns - track.seen_ns < _SEEN_NS and track.to_m > track.from_m:
+            if now_ns - track.seen_ns < SEEN_NS and track.to_m > track.from_m:
                 low_m, high_m, told_m = along_m + track.from_m, along_m + track.to_m, 0.0
                 if known is not None:
                     told_m = known[2]

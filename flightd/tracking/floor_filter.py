@@ -137,6 +137,10 @@ class FloorFilter:
         steady = self._steady[axis]
         return steady + (self.mean(PUSH[axis]) - steady) * math.exp(-ahead_s / self._noise.gust_s)
 
+    def speed_sigma_after(self, axis: int, ahead_s: float) -> float:
+        """Of the speed so much later: the push on it may be another one meanwhile."""
+        return math.hypot(self.sigma(VX + axis), self.sigma(PUSH[axis]) * ahead_s)
+
     def carrier(self) -> Carrier:
         """What carries the drone on while nothing new is known."""
         roll, pitch, psi = self.mean(ROLL), self.mean(PITCH), self.mean(PSI)

@@ -44,10 +44,8 @@ from flightd.tracking.motion_model import (
     MOUNT_YAW,
     PITCH,
     PSI,
-    PUSH,
     ROLL,
     SCALE,
-    VELOCITY,
     VX,
     VY,
     Told,
@@ -296,9 +294,9 @@ class LineTracker:
         yaw = wrap_pi(newest.yaw_rad + held.mean(PSI))
         known_ns = now_ns - self._forget_ns
         vx, vy, moved_x, moved_y, ax, ay = self._carried_to(now_ns)
-        ahead_s = (now_ns - self._stamp_ns) * 1e-9
-        sigmas = self._speed_sigma(0, ahead_s), self._speed_sigma(1, ahead_s)
-        off_x, off_y = (sigma * ahead_s for sigma in sigmas)
+        ahead_s, goes_on = (now_ns - self._stamp_ns) * 1e-9, self._stamp_ns > known_ns
+        sigma_x, sigma_y = self._speed_sigma(0, ahead_s), self._speed_sigma(1, ahead_s)
+        across_x, across_y = (self._lines(0), self._lines(1)) if goes_on else ((), ())
         return TrackSet(
             now_ns,
             self._lines_ns,
@@ -308,22 +306,18 @@ class LineTracker:
             vy,
             ax,
             ay,
-            tuple(
-                line.moved(moved_x, moved_y, off_x) for line in self._lines(0) if self._stamp_ns > known_ns
-            ),
-            tuple(
-                line.moved(moved_y, moved_x, off_y) for line in self._lines(1) if self._stamp_ns > known_ns
-            ),
+            tuple(line.moved(moved_x, moved_y, sigma_x * ahead_s) for line in across_x),
+            tuple(line.moved(moved_y, moved_x, sigma_y * ahead_s) for line in across_y),
             tuple(pad.moved(moved_x, moved_y) for pad in self._pads),
             self._stamp_ns,
             tuple(seen.moved(moved_x, moved_y) for seen in self._junctions),
             self._stamp_ns,
             sensors=held.sensors() if self._lines_ns else NOT_SEEN,
-            push_x_mps2=held.push_after(0, (now_ns - self._stamp_ns) * 1e-9),
-            push_y_mps2=held.push_after(1, (now_ns - self._stamp_ns) * 1e-9),
+            push_x_mps2=held.push_after(0, ahead_s),
+            push_y_mps2=held.push_after(1, ahead_s),
             markers=tuple(mark.moved(moved_x, moved_y) for mark in self._markers),
             features_ns=(self._features_ns[0], self._features_ns[1]),
-            velocity_sigma_mps=sigmas,
+            velocity_sigma_mps=(sigma_x, sigma_y),
         )
 
     def survey(self, axis: int, places_m: Mapping[int, float], sigma_m: float) -> None:
@@ -399,10 +393,8 @@ class LineTracker:
         ]
 
     def _speed_sigma(self, axis: int, ahead_s: float) -> float:
-        """Of the speed along an axis so long after the newest frame: the push on it may change meanwhile."""
-        if self._stands:
-            return _STANDING_MPS
-        return math.hypot(self._filter.sigma(VELOCITY[axis]), self._filter.sigma(PUSH[axis]) * ahead_s)
+        """Of the speed along an axis so long after the newest frame."""
+        return _STANDING_MPS if self._stands else self._filter.speed_sigma_after(axis, ahead_s)
 
     def _lines(self, axis: int) -> list[TrackedLine]:
         """All lines held across an axis, nearest to the drone first."""

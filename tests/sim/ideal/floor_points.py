@@ -10,6 +10,9 @@ from flightd.vision.floor.feature_tracking import MOST_TOLD
 from tests.sim.ideal.ideal_sight import EyeView
 
 _FOLLOWED = 12
+_PLACE_PX, _CREEP_PX, _LOST = 0.5, 0.2, 0.05
+"""Standard deviations in the picture, of a place and of what it creeps by from one picture to the next, and
+the share of the points that each picture loses."""
 
 
 @dataclass(slots=True)
@@ -21,22 +24,11 @@ class _Point:
     """What it has crept by from picture to picture."""
 
 
-@dataclass(frozen=True, slots=True)
-class PointErrors:
-    """Standard deviations in the picture, of a place and of what it creeps by from one picture to the next,
-    and the share of the points that each picture loses."""
-
-    place_px: float = 0.5
-    creep_px: float = 0.2
-    lost: float = 0.05
-
-
 class FloorPoints:
     """Follows some points that are in view, the oldest told, as the vision does; give `see` each picture."""
 
-    def __init__(self, seed: int, errors: PointErrors = PointErrors()) -> None:
+    def __init__(self, seed: int) -> None:
         self._random = random.Random(f"points {seed}")
-        self._errors = errors
         self._points: list[_Point] = []
         self._next_id = 0
 
@@ -46,20 +38,18 @@ class FloorPoints:
 
     def see(self, view: EyeView) -> tuple[FloorFeature, ...]:
         """Those followed from the picture before."""
-        rng, errors = self._random, self._errors
+        rng = self._random
         kept: list[_Point] = []
         told: list[FloorFeature] = []
         for point in self._points:
             at = view.pixel(point.x_m, point.y_m)
-            if at is None or rng.random() < errors.lost:
+            if at is None or rng.random() < _LOST:
                 continue
             kept.append(point)
-            du, dv = (off + rng.gauss(0.0, errors.creep_px) for off in point.off_px)
+            du, dv = (off + rng.gauss(0.0, _CREEP_PX) for off in point.off_px)
             point.off_px = du, dv
             if len(told) < MOST_TOLD:
-                u, v = (
-                    c + off + rng.gauss(0.0, errors.place_px) for c, off in zip(at, (du, dv), strict=True)
-                )
+                u, v = (c + off + rng.gauss(0.0, _PLACE_PX) for c, off in zip(at, (du, dv), strict=True))
                 told.append(FloorFeature(point.id, u, v))
         while len(kept) < _FOLLOWED:
             floor_m = view.floor(rng.random(), rng.random())

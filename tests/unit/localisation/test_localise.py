@@ -124,7 +124,7 @@ def test_on_a_kept_floor_a_slip_by_a_cell_is_not_taken_for_wear() -> None:
         assert not (wrong and pose.integrity > 0.99), "started one node further than it was told"
 
 
-def test_only_a_line_that_lay_below_says_where_on_the_map_it_is() -> None:
+def test_only_a_line_that_was_approached_says_where_on_the_map_it_is() -> None:
     localiser = GridLocaliser(SITE, "A1", FloorReach())
     along = [SITE.nodes[f"A{i}"].x_m for i in range(1, 5)]
     for tick in range(1, 250):
