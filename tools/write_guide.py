@@ -87,6 +87,7 @@ def _worlds() -> str:
         ("attitude: constant error, up to", "tilt_deg", 1, "deg"),
         ("attitude: error that wanders, rms", "tilt_wander_deg", 1, "deg"),
         ("attitude: leaks to level within", "leak_s", 1, "s"),
+        ("legs and floor: roll and pitch in which it stands, up to", "stand_deg", 1, "deg"),
         ("autopilot's clock fast or slow by up to", "clock_ppm", 1, "ppm"),
         ("autopilot's clock set in flight, by", "clock_leap_s", 1e3, "ms"),
         ("gyros: yaw rate off for good by up to", "yaw_drift_degps", 1, "deg/s"),

@@ -36,6 +36,9 @@ class SensorPriors(Section):
 
     attitude_deg: float = Field(0.7, gt=0, le=10, description="wandering error of the told roll and pitch")
     attitude_s: float = Field(8.0, gt=0, le=600, description="time within which that error wanders")
+    stand_deg: float = Field(
+        0.5, gt=0, le=10, description="roll and pitch in which the drone stands on its legs"
+    )
     leak_per_s: float = Field(
         0.1, gt=0, le=1, description="rate at which that attitude leaks towards what accelerometers feel"
     )
@@ -57,6 +60,10 @@ class SensorPriors(Section):
     @property
     def attitude_rad(self) -> float:
         return math.radians(self.attitude_deg)
+
+    @property
+    def stand_rad(self) -> float:
+        return math.radians(self.stand_deg)
 
     @property
     def mount_rad(self) -> float:

@@ -58,11 +58,13 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """What else the position loop goes by: the acceleration that no told lean explains (grid axes), against
-    which it leans, and by how much slower than configured it answers, 1 as configured."""
+    """What else control goes by: the acceleration that no told lean explains (grid axes), against which it
+    leans, by how much slower than configured it answers, 1 as configured, and the roll and pitch that are
+    told of a drone that is level."""
 
     unleant_mps2: tuple[float, float] = (0.0, 0.0)
     ease: float = 1.0
+    level_rad: tuple[float, float] = (0.0, 0.0)
 
 
 CALM = Conditions()
@@ -115,10 +117,18 @@ class FlightController:
         with_it = min(way * accel, kd * (most_mps - way * rate_mps) - abs(push))
         return way * max(with_it, -self._most_mps2)
 
-    def level(self, now_ns: int, motion: Motion, reference: Reference, dt_s: float) -> AttitudeSetpoint:
-        """Level and straight, height held: what is flown without a view of the floor.  The integrals
-        stand still, ready for when the view comes back."""
-        return AttitudeSetpoint(now_ns, 0.0, 0.0, 0.0, self._climb(motion, reference, dt_s))
+    def level(
+        self,
+        now_ns: int,
+        motion: Motion,
+        reference: Reference,
+        dt_s: float,
+        level_rad: tuple[float, float] = (0.0, 0.0),
+    ) -> AttitudeSetpoint:
+        """Level, by the roll and pitch that are told then, and straight, height held: what is flown without a
+        view of the floor.  The integrals stand still, ready for when the view comes back."""
+        roll_rad, pitch_rad = level_rad
+        return AttitudeSetpoint(now_ns, roll_rad, pitch_rad, 0.0, self._climb(motion, reference, dt_s))
 
     def rest(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from flightd.config.schema import Config
 from flightd.control.flight_controller import CALM, Conditions
@@ -24,6 +24,7 @@ from flightd.tracking.climb_doubt import ClimbDoubt
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.height_history import HeightHistory
 from flightd.tracking.line_tracker import LineTracker
+from flightd.tracking.standing_tilt import StandingTilt
 from flightd.tracking.stuck_height import StuckHeight
 
 _LATE_GAIN, _MOST_LATE_S = 0.02, 0.15
@@ -91,6 +92,7 @@ class StateEstimator:
         self._attitude_ns = 0
         self._obeys = False
         self.frames = FrameMonitor()
+        self._standing = StandingTilt()
         self.learnt = learnt
         """What the last flight has learnt of the sensors, or those before it."""
         self._begin(stand, armed=False)
@@ -131,6 +133,8 @@ class StateEstimator:
         self._judged_ns = self._shared_ns = 0
         self._frames_s = 0.0
         self._unleant = (0.0, 0.0)
+        self._risen = False
+        self._stood_ns, self._level_rad = 0, (0.0, 0.0)
         self.armed = armed
 
     @property
@@ -143,6 +147,10 @@ class StateEstimator:
         out with the last tick."""
         obeys = self._obeys_now(tick)
         self.response.sent(tick.now_ns, commanded if obeys else None)
+        v = tick.vehicle
+        self._risen = self._risen or (v is not None and v.may_fly)
+        # what levels itself by how it stands tells nothing of its legs
+        stands = v is not None and not self._risen and not v.hovers_unsteered
         for sample in tick.attitudes:
             late_s = max((tick.now_ns - sample.stamp_ns) * 1e-9, 0.0)
             self._telemetry_s += _LATE_GAIN * (min(late_s, _MOST_LATE_S) - self._telemetry_s)
@@ -150,11 +158,14 @@ class StateEstimator:
             self.tracker.attitude(sample)
             self.poses.add_attitude(sample)
             self.response.told(sample, obeys=obeys)
+            if stands:
+                self._standing.take(sample)
         if tick.attitudes:
             self._mind_jitter((tick.now_ns - self._attitude_ns) * 1e-9)
+        if stands or not self._stood_ns:  # some are in the air with the first that they tell once armed
+            self._mind_standing(tick.now_ns)
         self.tracker.assume(self.response.foreseen(tick.now_ns))
-        if tick.vehicle is not None:
-            v = tick.vehicle
+        if v is not None:
             if not self._stuck.found:
                 self._heights.add(v.height_stamp_ns, v.height_m, v.climb_mps)
             self._count_climb(tick.now_ns, v.climb_mps)
@@ -167,6 +178,18 @@ class StateEstimator:
             lines = self._waiting.popleft()
             self._judged_ns = lines.stamp_ns
             self._take_frame(lines)
+
+    def _mind_standing(self, now_ns: int) -> None:
+        tilt_rad = self._standing.at(now_ns)
+        if self.armed and tilt_rad is not None:
+            self._stood_ns, self._level_rad = now_ns, self.tracker.stands(tilt_rad)
+
+    def _level_at(self, now_ns: int) -> tuple[float, float]:
+        """Told roll and pitch of a drone that is level, as long as the error that was told on the ground
+        lasts; by what the picture makes of it later nobody flies blind."""
+        lasts_s = self._config.tracking.expert.priors.attitude_s
+        stood = self._stood_ns and (now_ns - self._stood_ns) * 1e-9 < lasts_s
+        return self._level_rad if stood else (0.0, 0.0)
 
     def _mind_jitter(self, late_s: float) -> None:
         late_s = min(max(late_s, 0.0), _MOST_JITTER_S)
@@ -260,7 +283,7 @@ class StateEstimator:
         tracker, response = self.tracker, self.response
         seen_ns = tracker.newest_ns
         if not seen_ns:
-            return CALM
+            return replace(CALM, level_rad=self._level_at(now_ns))
         late_s = min(max((now_ns - seen_ns) * 1e-9, 0.0), _MOST_LATE_S)
         self._frames_s += _LATE_GAIN * (late_s - self._frames_s)
         slower_s = max(2.0 / response.bandwidth_radps - _ATTITUDE_LAG_S, 0.0)
@@ -270,7 +293,8 @@ class StateEstimator:
         x, y = self._unleant
         now_x, now_y = tracker.unleant(now_ns)
         self._unleant = x + part * (now_x - x), y + part * (now_y - y)
-        return Conditions(self._unleant, min(max(_FREE_S / total_s, _LEAST_EASE), 1.0))
+        ease = min(max(_FREE_S / total_s, _LEAST_EASE), 1.0)
+        return Conditions(self._unleant, ease, self._level_at(now_ns))
 
     def _take_frame(self, lines: LineSet) -> None:
         exposed_ns, carried = self.tracker.exposed_ns(lines), self._carried

@@ -70,6 +70,8 @@ class Unknowns:
     tilt_bias_rad: tuple[float, float] | None = None
     """Roll and pitch told too large; None: the simulated autopilot's own small ones."""
     tilt_wander_rad: float = _SENSORS.tilt_wander_rad
+    stand_tilt_rad: tuple[float, float] = (0.0, 0.0)
+    """Roll and pitch in which it stands."""
     leak_s: float | None = None
     """Time within which the told attitude leaks towards level; None: it does not."""
     clock_ppm: float = 20.0
@@ -187,6 +189,7 @@ class Unknowns:
             configured,
             hover_collective=configured.hover_collective * self.hover_share,
             drag_per_s=configured.drag_per_s * self.drag_share,
+            rest_tilt_rad=self.stand_tilt_rad,
             battery_capacity_ah=configured.battery_capacity_ah * self.capacity_share,
             sags=self.thrust_to_weight is not None,
             thrust_to_weight=self.thrust_to_weight,
@@ -219,6 +222,7 @@ class Spread:
     map_m: float
     tilt_deg: float
     tilt_wander_deg: float
+    stand_deg: float
     leak_s: float
     clock_ppm: float
     clock_leap_s: float
@@ -264,6 +268,7 @@ SPREADS = {
         map_m=0.01,
         tilt_deg=0.5,
         tilt_wander_deg=0.15,
+        stand_deg=0.5,
         leak_s=6.0,
         clock_ppm=50.0,
         clock_leap_s=0.0,
@@ -307,6 +312,7 @@ SPREADS = {
         map_m=0.05,
         tilt_deg=0.5,
         tilt_wander_deg=1.0,
+        stand_deg=1.0,
         leak_s=2.0,
         clock_ppm=20_000.0,
         clock_leap_s=0.020,
@@ -345,6 +351,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     most, rng = SPREADS[kind], random.Random(f"unknowns {kind} {seed}")
     leaps = random.Random(f"leaps {kind} {seed}")
     body, light = random.Random(f"body {kind} {seed}"), random.Random(f"exposure {kind} {seed}")
+    legs = random.Random(f"legs {kind} {seed}")
 
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
@@ -366,6 +373,10 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         map_error_m=most.map_m,
         tilt_bias_rad=(math.radians(within(most.tilt_deg)), math.radians(within(most.tilt_deg))),
         tilt_wander_rad=math.radians(most.tilt_wander_deg),
+        stand_tilt_rad=(
+            math.radians(legs.uniform(-most.stand_deg, most.stand_deg)),
+            math.radians(legs.uniform(-most.stand_deg, most.stand_deg)),
+        ),
         leak_s=most.leak_s,
         clock_ppm=within(most.clock_ppm),
         clock_leap=leap(leaps.choice((-1.0, 1.0)) * most.clock_leap_s),

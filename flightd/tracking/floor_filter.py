@@ -27,7 +27,7 @@ from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, p
 from flightd.tracking.held_lines import SURE_HITS, HeldLine, associate, refound
 from flightd.tracking.innovations import Innovations
 from flightd.tracking.kalman import corrected, predicted
-from flightd.tracking.leap_test import LeapTest
+from flightd.tracking.leap_test import SIDES, LeapTest
 from flightd.tracking.line_sight import FeatureSight, LineSight, Rates
 from flightd.tracking.motion_model import (
     DELAY,
@@ -66,8 +66,11 @@ _MOST_HEIGHT_SHARE = 0.05
 _MOST_LEAK_PER_S = 1.0
 _MOST_SCALE = 0.5
 _MOST_SIGMAS = 4.0
-"""A delay further off than so many sigmas of what was thought possible is not believed."""
+"""What is further off than so many sigmas of what was thought possible is not believed."""
+_USUAL_SIGMAS = 2.5
 _DELAY_LEAP_S = 0.02
+_SPENT = 0.5
+"""Share of a leap: what is left of it once the filter would have followed the rest."""
 _OUTLIER_SIGMAS = 3.0
 """What errs by more is weighed less (Huber)."""
 _FRESH, _TELLING, _FEATURE_SIGMAS = 3, 2, 4.0
@@ -108,6 +111,8 @@ class FloorFilter:
         self._refused: set[int | None] = set()
         self._innovations = Innovations(priors.shake_rad, priors.shake_bounds_rad)
         self.delay_leap = LeapTest(_DELAY_LEAP_S)
+        self._leapt: Matrix = np.zeros((FIRST_LINE, len(SIDES)))
+        """By what all states would err, had the delay leapt to either side when its test last began."""
 
     # What is known
 
@@ -200,6 +205,23 @@ class FloorFilter:
         """The drone stands, or has hardly risen: it moves as little as at first, whatever it leans."""
         self._begin_anew([VX, VY, PUSH_X, PUSH_Y])
 
+    def stand_level(self, told_rad: tuple[float, float]) -> None:
+        """The drone stands in that roll and pitch, as they are told: they should be those of its legs.  One
+        leg on a cable leans it further than legs do: what is beyond `_USUAL_SIGMAS` says the less the further
+        it is (Hampel's estimator), beyond `_MOST_SIGMAS` nothing."""
+        self._begin_anew([ROLL, PITCH])
+        for state, tilt_rad in zip((ROLL, PITCH), told_rad, strict=True):
+            unknown = self._p.item(state, state)
+            spread = unknown + self._priors.stand_rad**2
+            sigmas = abs(tilt_rad) / math.sqrt(spread)
+            if not sigmas < _MOST_SIGMAS:
+                continue
+            fades = min((_MOST_SIGMAS - sigmas) / (_MOST_SIGMAS - _USUAL_SIGMAS), 1.0)
+            told = math.copysign(fades * min(sigmas, _USUAL_SIGMAS) * math.sqrt(spread), tilt_rad)
+            self._x[state] = -told * unknown / spread
+            if sigmas <= _USUAL_SIGMAS:
+                self._p[state, state] = unknown * (1.0 - unknown / spread)
+
     def forget(self) -> None:
         """Know no line and no motion any more; what was learnt of the sensors stays."""
         self._drop(range(len(self.held)))
@@ -225,6 +247,7 @@ class FloorFilter:
             self._drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
         noise_q[_DIAGONAL] += self._drift**2 * dt_s
         self._p = predicted(self._p, step.jacobian, noise_q)
+        self._leapt = step.jacobian @ self._leapt
         self.delay_leap.moved(self.mean(DELAY), self.sigma(DELAY), dt_s)
         self._fade(dt_s)
 
@@ -261,12 +284,12 @@ class FloorFilter:
         for sight in sights:
             if not math.isnan(sight.turn_rad):
                 told.add_turn(sight, self._x, rates)
-        self._take(told, self._unmoved(assumed=assumed, exact=exact))
+        self._take(told, self._unmoved(assumed=assumed, exact=exact), tested=not assumed)
         carried = FrameMeasurement()
         for sight, line in followed:
             carried.add_offset(sight, line, self.held[line].lever_m, self._x, rates, before)
         # a feature lives too short to tell more than the motion
-        self._take(carried, _BUT_MOTION, minded=False)
+        self._take(carried, _BUT_MOTION, minded=False, tested=False)
         for sight, line in known + followed:
             held = self.held[line]
             if held.feature is not None:
@@ -308,8 +331,7 @@ class FloorFilter:
             spread_m = math.sqrt(float(row @ self._p @ row) + sigma_m**2)
             held.surveyed = other.surveyed = True
             if abs(off_m) < _SURVEY_SIGMAS * spread_m:
-                noise, errors = np.array([[sigma_m**2]]), np.array([off_m])
-                self._x, self._p, _ = corrected(self._x, self._p, row[None, :], errors, noise)
+                self._correct(row[None, :], np.array([off_m]), np.array([[sigma_m**2]]))
 
     def _refind(self, seen: Sequence[int], stamp_ns: int) -> None:
         """Take lines `seen` in this frame for those that were lost and should be there."""
@@ -333,7 +355,7 @@ class FloorFilter:
         row = self._between(new, old)
         errors, noise = np.array([float(row @ self._x)]), np.array([[_SAME_LINE_M**2]])
         # a dead-reckoned line tells of the motion, not of the sensors
-        self._x, self._p, _ = corrected(self._x, self._p, row[None, :], errors, noise, _BUT_MOTION)
+        self._correct(row[None, :], errors, noise, _BUT_MOTION)
         self._bound_push()
         kept, found = self.held[old], self.held[new]
         kept.seen_ns, kept.hits, kept.width_m = found.seen_ns, kept.hits + found.hits, found.width_m
@@ -341,7 +363,7 @@ class FloorFilter:
 
     def _begin_anew(self, states: list[int]) -> None:
         """These are as unknown as at first, and nothing that is known says anything of them."""
-        self._x[states] = 0.0
+        self._x[states] = self._leapt[states] = 0.0
         self._p[states, :] = 0.0
         self._p[:, states] = 0.0
         self._p[states, states] = self._first_sigmas[states] ** 2
@@ -355,6 +377,7 @@ class FloorFilter:
             if self._unseen_s[axis] > _UNSEEN_S:
                 self._x[push] = self.push_after(axis, dt_s)
                 kept = math.exp(-dt_s / self._noise.gust_s)  # and with the gust what is not known of it
+                self._leapt[push] *= kept
                 self._p[push, :] *= kept
                 self._p[:, push] *= kept
             else:
@@ -402,10 +425,15 @@ class FloorFilter:
         return known, strange
 
     def _take(
-        self, measured: FrameMeasurement, unmoved: slice | list[int] | None, *, minded: bool = True
+        self,
+        measured: FrameMeasurement,
+        unmoved: slice | list[int] | None,
+        *,
+        minded: bool = True,
+        tested: bool = True,
     ) -> None:
         """Bring g to 0, but for the states that are `unmoved`.  What shakes moves all lines alike.  The noise
-        follows what is `minded`."""
+        follows what is `minded`; a delay that leaps shows in what is `tested`."""
         if not measured.rows:
             return
         rows, errors, by_tilt = map(np.array, (measured.rows, measured.errors, measured.by_tilt))
@@ -416,7 +444,7 @@ class FloorFilter:
         expected = np.einsum("ij,jk,ik->i", rows, self._p, rows) + np.diag(noise)
         outlying = np.maximum(np.abs(errors) / np.sqrt(expected) / _OUTLIER_SIGMAS, 1.0)
         noise += np.diag((outlying - 1.0) * expected)
-        self._x, self._p, spread = corrected(self._x, self._p, rows, errors, noise, unmoved)
+        by_leap, spread = self._correct(rows, errors, noise, unmoved)
         delay_s = _MOST_SIGMAS * self._priors.delay_s
         self._bound_push()
         self._bound(LEAK, 0.0, _MOST_LEAK_PER_S)
@@ -425,8 +453,33 @@ class FloorFilter:
         self._bound(DELAY, -delay_s, min(delay_s, self._latency_s))  # no frame arrives before it is exposed
         if minded:
             self._mind(errors, spread, by_tilt, measured.axes)
-            if self.delay_leap.contradicted(rows[:, DELAY], errors, spread):
-                self._p[DELAY, DELAY] += self._priors.delay_s**2
+        if tested:
+            self._test_delay(by_leap, errors, spread)
+
+    def _test_delay(self, by_leap: Matrix, errors: Matrix, spread: Matrix) -> None:
+        """What has leapt is as unknown as at first, and with it all that has been made of it since."""
+        test = self.delay_leap
+        side = test.contradicted(by_leap, errors, spread)
+        if side is not None:
+            off = self._leapt[:, side] * (self._priors.delay_s / test.leap)
+            self._p += np.outer(off, off)
+        for tried in range(len(SIDES)):
+            if abs(self._leapt.item(DELAY, tried)) < _SPENT * test.leap:
+                test.restart(tried)
+        for begun in test.begins:
+            self._leapt[:, begun] = 0.0
+            self._leapt[DELAY, begun] = -SIDES[begun] * test.leap
+
+    def _correct(
+        self, rows: Matrix, errors: Matrix, noise: Matrix, unmoved: slice | list[int] | None = None
+    ) -> tuple[Matrix, Matrix]:
+        """Bring the errors (m,) to 0; (m, 2) what of them a leap of the delay would have made, and (m, m) how
+        they were expected to spread."""
+        by_leap = rows @ self._leapt
+        states, off = np.column_stack((self._x, self._leapt)), np.column_stack((errors, by_leap))
+        states, self._p, spread = corrected(states, self._p, rows, off, noise, unmoved)
+        self._x, self._leapt = states[:, 0].copy(), states[:, 1:]
+        return by_leap, spread
 
     def _bound_push(self) -> None:
         for push in PUSH:
@@ -456,6 +509,7 @@ class FloorFilter:
         grown[n, n] = row @ self._p @ row + sight.sigma_m**2 + shaken
         offset_m = sight.offset_m + float(row[:FIRST_LINE] @ (self._x[:FIRST_LINE] - before))
         self._x, self._p = np.append(self._x, offset_m), grown
+        self._leapt = np.vstack((self._leapt, row @ self._leapt))
         self.held.append(
             HeldLine(
                 self._next_id,
@@ -488,4 +542,5 @@ class FloorFilter:
         kept = [line for line in range(len(self.held)) if line not in lines]
         rows = [*range(FIRST_LINE), *(FIRST_LINE + line for line in kept)]
         self._x, self._p = self._x[rows], self._p[np.ix_(rows, rows)]
+        self._leapt = self._leapt[rows]
         self.held = [self.held[line] for line in kept]

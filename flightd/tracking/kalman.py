@@ -26,7 +26,7 @@ def corrected(
     unmoved: slice | list[int] | None = None,
 ) -> tuple[Matrix, Matrix, Matrix]:
     """(n,) state and (n, n) covariance that bring m measured errors to 0, and the (m, m) covariance that the
-    errors were expected to have.
+    errors were expected to have; of several states (n, k) each by its own errors (m, k).
 
     `errors` (m,) are h(x) - z, or any g(x) that is 0 where state and measurement agree, `rows` (m, n) their
     derivative by the state, `noise` (m, m) the covariance of what was measured.  States that are `unmoved`

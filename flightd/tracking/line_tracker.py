@@ -192,6 +192,13 @@ class LineTracker:
             offset = wrap_pi(self._start_yaw_rad - carried.yaw_rad)
             self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
 
+    def stands(self, told_rad: tuple[float, float]) -> tuple[float, float]:
+        """The drone has not risen yet, and stands in that roll and pitch (rad) as they are told; returned are
+        those in which it is believed to be level.  Once lines have told of the attitude, it says no more."""
+        if not self._lines_ns:
+            self._filter.stand_level(told_rad)
+        return -self._filter.mean(ROLL), -self._filter.mean(PITCH)
+
     def exposed_ns(self, lines: LineSet) -> int:
         """When the frame was exposed, by what has been learnt of the camera's delay."""
         return lines.stamp_ns + round(self._filter.mean(DELAY) * 1e9)

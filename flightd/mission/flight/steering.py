@@ -58,7 +58,7 @@ class Steering:
             control.reset()
             return None
         if guidance.guide is Guide.LEVEL or pose is None:
-            wanted, age_s = control.level(now_ns, motion, reference, dt_s), 0.0
+            wanted, age_s = control.level(now_ns, motion, reference, dt_s, conditions.level_rad), 0.0
         elif guidance.guide is Guide.BRAKE:
             wanted = control.rest(
                 now_ns, motion, reference, dt_s, push, dead_reckoned=guidance.dead_reckoned, ease=ease

@@ -39,6 +39,8 @@ class AirframeParams:
     hover_collective: float = 0.34
     motor_lag_s: float = 0.05
     rest_height_m: float = 0.10
+    rest_tilt_rad: tuple[float, float] = (0.0, 0.0)
+    """Roll and pitch in which it stands: legs and floor are not quite level."""
     floor_friction: float = 0.6
     battery_capacity_ah: float = 5.0
     battery_cells: int = 3
@@ -88,7 +90,7 @@ class Airframe:
         self.wind, self.wash = Wind(wind or WindParams(), seed), wash
         self.x_m, self.y_m, self.height_m = x_m, y_m, self.params.rest_height_m
         self.vx_mps = self.vy_mps = self.climb_mps = 0.0
-        self.roll_rad = self.pitch_rad = 0.0
+        self.roll_rad, self.pitch_rad = self.params.rest_tilt_rad
         self.yaw_rad = wrap_pi(yaw_rad)
         self.roll_speed_radps = self.pitch_speed_radps = self.yaw_speed_radps = 0.0
         self.collective = 0.0
@@ -173,7 +175,7 @@ class Airframe:
     def _turn(self, dt_s: float, command: AirframeCommand) -> None:
         p = self.params
         standing = self.on_floor and self.collective < 0.8 * p.hover_collective
-        roll_target, pitch_target = (0.0, 0.0) if standing else (command.roll_rad, command.pitch_rad)
+        roll_target, pitch_target = p.rest_tilt_rad if standing else (command.roll_rad, command.pitch_rad)
         omega, limit = p.attitude_bandwidth_radps, p.attitude_accel_max_radps2 * self._authority()
         stiffness, damping = omega * omega, 2.0 * p.attitude_damping * omega
 

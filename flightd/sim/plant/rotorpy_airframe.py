@@ -88,8 +88,8 @@ class RotorpyAirframe(Airframe):
         self._drain(dt_s, lift_n / weight_n, motors=command.motors)
 
     def _stand(self, dt_s: float, thrust_n: float) -> None:
-        """On its skids, level, the motors at what is asked of them."""
-        self.roll_rad = self.pitch_rad = 0.0
+        """On its skids, the motors at what is asked of them."""
+        self.roll_rad, self.pitch_rad = self.params.rest_tilt_rad
         self.roll_speed_radps = self.pitch_speed_radps = self.yaw_speed_radps = 0.0
         self._body_radps = np.zeros(3)
         weight_n = self._mass_kg * GRAVITY_MPS2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,25 @@ def test_an_attitude_that_leaks_within_two_seconds_is_flown_by() -> None:
 def test_a_camera_turned_in_its_mount_and_a_wrong_focal_length_are_flown_by() -> None:
     result = flown(Unknowns(mount_yaw_rad=math.radians(4.0), focal_share=0.96))
     assert rms_off_line(result, SITE) < 0.04
+
+
+def drifted_m(unknowns: Unknowns, seed: int) -> float:
+    """How far a take-off leaves its pad."""
+    result = flown(unknowns, seed)
+    pad = SITE.pad_centre(SITE.home)
+    risen = [truth for phase, truth in result.truth if phase is Phase.TAKE_OFF]
+    return max(math.hypot(one.x_m - pad[0], one.y_m - pad[1]) for one in risen)
+
+
+def test_a_take_off_by_a_wrong_attitude_drifts_by_little_where_legs_are_level() -> None:
+    """It climbs by the attitude alone until a line is in view; what hides that it is wrong while the drone
+    stands, legs aslant by as much, shows what that is worth."""
+    wrong_rad = math.radians(1.5), math.radians(-1.5)
+    wrong = Unknowns(tilt_bias_rad=wrong_rad)
+    hidden = replace(wrong, stand_tilt_rad=(-wrong_rad[0], -wrong_rad[1]))
+    seen_m, hidden_m = (max(drifted_m(one, seed) for seed in (1, 2)) for one in (wrong, hidden))
+    assert seen_m < 0.15
+    assert hidden_m > 1.5 * seen_m
 
 
 @pytest.mark.parametrize("seed", [12, 13])

@@ -130,6 +130,20 @@ def test_the_floor_stops_the_fall_and_rubs_off_the_speed() -> None:
     assert airframe.climb_mps == 0.0
 
 
+def test_it_stands_as_its_legs_do_and_flies_level() -> None:
+    legs = math.radians(1.0), math.radians(-0.7)
+    airframe = Airframe(AirframeParams(rest_tilt_rad=legs), wind=CALM)
+    for _ in range(100):
+        airframe.step(DT_S, AirframeCommand())
+    assert (airframe.roll_rad, airframe.pitch_rad) == pytest.approx(legs)
+    risen = fly(airframe, 2.0, lambda _: (0.0, 0.0, 0.5))[-1]
+    assert (risen.roll_rad, risen.pitch_rad) == pytest.approx((0.0, 0.0), abs=1e-4)
+    for _ in range(1500):
+        airframe.step(DT_S, AirframeCommand())
+    assert airframe.on_floor
+    assert (airframe.roll_rad, airframe.pitch_rad) == pytest.approx(legs, abs=1e-3)
+
+
 def test_the_battery_drains_with_thrust_and_its_end_stops_the_motors() -> None:
     airframe = Airframe(AirframeParams(battery_capacity_ah=0.02), CALM)
     full_v = airframe.battery_v

@@ -78,6 +78,12 @@ def test_it_stands_until_it_is_lifted_and_lands_again() -> None:
     assert frame.collective == pytest.approx(0.0, abs=1e-6)
 
 
+def test_it_stands_as_its_legs_do() -> None:
+    frame = airframe_kind(PlantKind.ROTORPY)(AirframeParams(rest_tilt_rad=(0.02, -0.01)), wind=STILL_AIR)
+    flown(frame, 0.5, lambda _: AirframeCommand())
+    assert (frame.roll_rad, frame.pitch_rad) == (0.02, -0.01)
+
+
 def test_the_same_seed_flies_the_same() -> None:
     places = [made(PlantKind.ROTORPY, WindParams(), seed=5).x_m for _ in range(2)]
     assert places[0] == places[1]

@@ -36,12 +36,14 @@ def test_what_is_drawn_stays_within_its_world_and_reaches_what_it_is_of(kind: Wo
     assert max(map(abs, delays)) <= most.delay_s
     assert max(delays) > 0.8 * most.delay_s
     assert min(delays) < -0.8 * most.delay_s
+    assert max(one.stand_tilt_rad[0] for one in drawn) > 0.8 * math.radians(most.stand_deg)
     for one in drawn:
         camera = one.camera(SimCamera())
         assert camera.capture_delay_s == pytest.approx(max(0.060 + one.camera_delay_s, 0.005))
         assert abs(math.degrees(camera.mount.roll_rad)) <= most.mount_deg
         assert abs(camera.lens.fx_px / SimCamera().lens.fx_px - 1.0) <= most.focal_share
         assert one.sensors(SensorParams()).leak_s == most.leak_s
+        assert max(map(abs, one.airframe(AirframeParams()).rest_tilt_rad)) <= math.radians(most.stand_deg)
         assert most.quickest_exposure_s <= one.exposure_lag_s <= most.slowest_exposure_s
         assert most.least_flicker <= one.flicker <= most.most_flicker
         assert 0.0 <= one.sensors(SensorParams()).compass_rad <= math.radians(most.compass_deg)

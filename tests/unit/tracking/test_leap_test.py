@@ -7,26 +7,31 @@ import random
 import numpy as np
 import pytest
 
-from flightd.tracking.leap_test import LeapTest
+from flightd.tracking.leap_test import SIDES, LeapTest
 
-LEAP, BY_STATE = 2.0, np.array([0.25, 0.0])
+LEAP = 2.0
+BY_LEAP = LEAP * np.array([[0.25, -0.25], [0.0, 0.0]])
+"""What a leap to either side makes of two lines, in sigmas: the first tells the state."""
 
 
 def known(sigma: float = 0.1) -> LeapTest:
     tested = LeapTest(LEAP)
-    tested.moved(5.0, sigma, 0.03)
+    for _ in range(200):
+        tested.moved(5.0, sigma, 0.03)
     return tested
 
 
 def contradictions(tested: LeapTest, off: float, frames: int, seed: int) -> list[int]:
-    """In which frames a state is contradicted that is off by so much; the first of two lines tells it by a
-    quarter of a sigma."""
+    """In which frames a state is contradicted that is off by so much."""
     rng, found = random.Random(seed), []
     for frame in range(frames):
-        errors = np.array([-BY_STATE[0] * off + rng.gauss(0.0, 1.0), rng.gauss(0.0, 1.0)])
-        if tested.contradicted(BY_STATE, errors, np.eye(2)):
+        errors = BY_LEAP[:, 0] * off / LEAP + [rng.gauss(0.0, 1.0), rng.gauss(0.0, 1.0)]
+        side = tested.contradicted(BY_LEAP, errors, np.eye(2))
+        if side is not None:
+            assert SIDES[side] * off > 0.0
             found.append(frame)
-            tested.moved(5.0, 0.1, 0.03)
+            for _ in range(200):
+                tested.moved(5.0, 0.1, 0.03)
     return found
 
 
@@ -46,7 +51,34 @@ def test_one_that_is_known_as_well_as_that_has_not_leapt(off: float) -> None:
 
 
 def test_what_was_not_known_does_not_leap() -> None:
-    assert not contradictions(known(sigma=0.7), 8.0, 100, 0)
+    assert not contradictions(known(sigma=1.1), 8.0, 100, 0)
+
+
+def test_a_side_begins_anew_once_nothing_speaks_for_it() -> None:
+    tested = known()
+    assert tested.begins == [0, 1]
+    for error, begins in ((1.0, [1]), (-1.0, [0]), (0.0, [0, 1])):
+        for _ in range(8):
+            assert tested.contradicted(BY_LEAP, BY_LEAP[:, 0] * error, np.eye(2)) is None
+        assert tested.begins == begins
+    assert tested.contradicted(BY_LEAP, BY_LEAP[:, 0], np.eye(2)) is None
+    tested.restart(0)
+    assert tested.begins == [0, 1]
+
+
+def test_what_moves_no_further_than_it_was_doubted_has_not_leapt() -> None:
+    tested = known(sigma=0.9)
+    for frame in range(100):
+        tested.moved(5.0 + min(0.1 * frame, 2.5), max(0.9 - 0.01 * frame, 0.1), 0.03)
+    assert tested.leaps == 0
+
+
+def test_what_is_only_just_known_does_not_leap() -> None:
+    tested = LeapTest(LEAP)
+    for frame in range(100):
+        tested.moved(5.0 - min(0.1 * frame, 3.0), 0.1, 0.03)
+        assert tested.contradicted(BY_LEAP, BY_LEAP[:, 0] * 4.0, np.eye(2)) is None
+    assert tested.leaps == 0
 
 
 def test_one_that_was_moved_by_a_leap_within_seconds_has_leapt_once() -> None:

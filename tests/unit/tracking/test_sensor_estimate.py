@@ -25,7 +25,6 @@ SITE = random_site(3)
 XS_M = sorted({node.x_m for node in SITE.nodes.values()})
 TICK_S, FRAME_S, ARRIVES_S = 0.02, 1 / 30, 0.1
 DRAG_PER_S = 0.25
-LEAP_AT_S = 15.0
 WAVES_X = ((0.15, 2.6, 0.0), (0.15, 1.1, 0.5), (0.05, 4.1, 2.0))
 WAVES_Y = ((0.15, 2.1, 1.0), (0.15, 0.9, 2.5), (0.05, 3.7, 0.3))
 """Amplitude (m), rate (rad/s) and phase: of one rate alone a leaking attitude looks like a late one."""
@@ -37,7 +36,8 @@ class Truth:
 
     delay_s: float = 0.0
     leap_s: float = 0.0
-    """By so much more from `LEAP_AT_S` on."""
+    leaps_at_s: float = 15.0
+    """From when on it is later by `leap_s`."""
     mount_roll_deg: float = 0.0
     mount_pitch_deg: float = 0.0
     told_roll_deg: float = 0.0
@@ -98,7 +98,7 @@ def told(
                 angle + shakes.gauss(0.0, shake_rad) for angle in (k.roll_rad, k.pitch_rad)
             )
             shaken = replace(k, roll_rad=roll_rad, pitch_rad=pitch_rad)
-            delay_s = truth.delay_s + (truth.leap_s if t > LEAP_AT_S else 0.0)
+            delay_s = truth.delay_s + (truth.leap_s if t > truth.leaps_at_s else 0.0)
             waiting.append((t + ARRIVES_S, eye.see(shaken, n, round((t - delay_s) * 1e9))))
         while waiting and waiting[0][0] <= t:
             tracker.frame(waiting.pop(0)[1], HEIGHT_M / (1.0 + truth.height_share))
@@ -110,18 +110,46 @@ def told(
     return tracks.sensors
 
 
+def test_who_stands_tells_the_error_of_the_told_attitude_as_far_as_legs_are_level() -> None:
+    tracker = LineTracker(LENS, Mount(), SITE.line_width_m, 0.0)
+    told_rad = math.radians(1.5), math.radians(-0.6)
+    for _ in range(50):
+        level_rad = tracker.stands(told_rad)  # however often it is told: it is one floor on which it stands
+    priors = DEFAULTS.expert.priors
+    spread = priors.attitude_rad**2 + priors.stand_rad**2
+    share = priors.attitude_rad**2 / spread
+    assert level_rad == pytest.approx((share * told_rad[0], share * told_rad[1]))
+    leans_rad = [tracker.stands((math.sqrt(spread) * sigmas, 0.0))[0] for sigmas in (2.5, 3.0, 3.9, 4.1, 9.0)]
+    assert leans_rad == sorted(leans_rad, reverse=True), "the more a leg on something explains it"
+    assert leans_rad[0] == pytest.approx(2.5 * math.sqrt(spread) * share)
+    assert leans_rad[3:] == [0.0, 0.0]
+
+
 def never_leaps(tracker: LineTracker, t: float) -> None:
     assert not tracker.delay_leaps, t
 
 
-def test_a_delay_that_leaps_is_told_and_learnt_anew() -> None:
+@pytest.mark.parametrize(
+    ("leap_s", "shake_deg", "leaps_at_s", "within_s"),
+    [(0.04, 0.15, 15.0, 1.0), (-0.033, 0.15, 15.0, 4.0), (0.033, 0.3, 40.0, 3.0)],
+)
+@pytest.mark.parametrize("seed", range(4))
+def test_a_delay_that_leaps_is_told_and_learnt_anew(
+    leap_s: float, shake_deg: float, leaps_at_s: float, within_s: float, seed: int
+) -> None:
     """Where the drone leans meanwhile; where it hardly does that is learnt as slowly as ever."""
     leaps: list[tuple[float, int]] = []
-    truth = Truth(delay_s=0.02, leap_s=0.04, shake_deg=0.15)
-    sensors = told(truth, 1, LEAP_AT_S + 4.0, lambda tracker, t: leaps.append((t, tracker.delay_leaps)))
-    assert abs(sensors.delay_s - 0.06) < 0.012
+    truth = Truth(delay_s=0.02, leap_s=leap_s, shake_deg=shake_deg, leaps_at_s=leaps_at_s)
+    sensors = told(truth, seed, leaps_at_s + 8.0, lambda tracker, t: leaps.append((t, tracker.delay_leaps)))
+    assert abs(sensors.delay_s - truth.delay_s - leap_s) < 0.01
     assert leaps[-1][1] == 1
-    assert LEAP_AT_S < next(t for t, count in leaps if count) < LEAP_AT_S + 1.0
+    assert leaps_at_s < next(t for t, count in leaps if count) < leaps_at_s + within_s
+
+
+@pytest.mark.parametrize("shake_deg", [0.3, 0.5])
+def test_a_delay_that_stays_never_leaps_however_the_camera_shakes(shake_deg: float) -> None:
+    for seed in (0, 1):
+        told(Truth(delay_s=0.02, shake_deg=shake_deg), seed, 60.0, never_leaps)
 
 
 @pytest.mark.parametrize("delay_ms", [-40, 0, 50])

@@ -1,0 +1,82 @@
+"""What the estimator makes of the attitude that is told while the drone stands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from flightd.core.tick import TickInput
+from flightd.core.types import Attitude, LandedState, VehicleState
+from flightd.localisation.state_estimator import StateEstimator
+from tests.unit.mission.configured import configured
+from tests.unit.mission.driven import SITE
+
+TICK_NS = 20_000_000
+TOLD_RAD = math.radians(1.5), math.radians(-0.6)
+BELIEVED = 0.7**2 / (0.7**2 + 0.5**2)
+"""Of what legs and attitude are thought to be wrong by, the attitude's share."""
+LEVEL = pytest.approx((BELIEVED * TOLD_RAD[0], BELIEVED * TOLD_RAD[1]), rel=0.01)
+NOTHING = (0.0, 0.0)
+
+
+class Standing:
+    """An estimator that is told of a drone at each tick, as `told` does."""
+
+    def __init__(self, *, hovers_unsteered: bool = False) -> None:
+        self.estimator = StateEstimator(SITE, configured(), 0.5, (SITE.home.node, 0.0))
+        self.now_ns = 10**12
+        self._hovers_unsteered = hovers_unsteered
+
+    def told(self, seconds: float, landed: LandedState | None, *, armed: bool) -> tuple[float, float]:
+        """Which attitude is level afterwards; None: nothing is told."""
+        for _ in range(round(seconds * 50)):
+            self.now_ns += TICK_NS
+            if landed is None:
+                self.estimator.take(TickInput(self.now_ns), None)
+                continue
+            attitude = Attitude(self.now_ns, *TOLD_RAD, 0.0)
+            vehicle = VehicleState(
+                attitude, 0.1, self.now_ns, 0.0, "GUIDED", True, armed, landed, 0.8, 12.0, self.now_ns
+            )
+            vehicle = replace(vehicle, hovers_unsteered=self._hovers_unsteered)
+            if armed is not self.estimator.armed:
+                self.estimator.begin((SITE.home.node, 0.0), armed=armed)
+            self.estimator.take(TickInput(self.now_ns, vehicle=vehicle, attitudes=(attitude,)), None)
+        return self.estimator.step(self.now_ns).conditions.level_rad
+
+
+@pytest.mark.parametrize("stands_armed_s", [0.0, 3.0])
+def test_a_take_off_is_level_by_what_was_told_on_the_floor_for_as_long_as_that_lasts(
+    stands_armed_s: float,
+) -> None:
+    drone = Standing()
+    assert drone.told(1.0, None, armed=False) == NOTHING
+    assert drone.told(3.0, LandedState.ON_GROUND, armed=False) == NOTHING
+    drone.told(stands_armed_s, LandedState.ON_GROUND, armed=True)
+    assert drone.told(2.0, LandedState.IN_AIR, armed=True) == LEVEL
+    assert drone.told(7.0, LandedState.IN_AIR, armed=True) == NOTHING
+
+
+def test_each_flight_is_told_anew() -> None:
+    drone = Standing()
+    drone.told(3.0, LandedState.ON_GROUND, armed=True)
+    drone.told(20.0, LandedState.IN_AIR, armed=True)
+    assert drone.told(3.0, LandedState.ON_GROUND, armed=True) == NOTHING, "it may lean on what it landed on"
+    drone.told(3.0, LandedState.ON_GROUND, armed=False)
+    assert drone.told(1.0, LandedState.IN_AIR, armed=True) == LEVEL
+
+
+def test_of_a_drone_that_was_found_flying_nothing_is_known() -> None:
+    drone = Standing()
+    assert drone.told(3.0, LandedState.IN_AIR, armed=True) == NOTHING
+    drone = Standing()
+    drone.told(3.0, LandedState.ON_GROUND, armed=False)
+    drone.told(1.5, None, armed=False)
+    assert drone.told(1.0, LandedState.IN_AIR, armed=True) == NOTHING, "it was not seen to rise from there"
+
+
+def test_what_levels_itself_by_how_it_stands_says_nothing() -> None:
+    drone = Standing(hovers_unsteered=True)
+    assert drone.told(3.0, LandedState.ON_GROUND, armed=True) == NOTHING
