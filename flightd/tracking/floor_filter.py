@@ -283,7 +283,7 @@ class FloorFilter:
             told.add_offset(sight, line, self.held[line].lever_m, self._x, rates)
         for sight in sights:
             if not math.isnan(sight.turn_rad):
-                told.add_turn(sight, self._x, rates)
+                told.add_turn(sight, self._x, self._p, rates, self._innovations.shake_rad)
         self._take(told, self._unmoved(assumed=assumed, exact=exact), tested=not assumed)
         carried = FrameMeasurement()
         for sight, line in followed:

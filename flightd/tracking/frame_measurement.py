@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from flightd.core.geometry import Matrix
@@ -20,6 +22,9 @@ from flightd.tracking.motion_model import (
     SCALE,
     VELOCITY,
 )
+
+_ASKEW_RAD, _ASKEW_SIGMAS = math.radians(1.5), 4.0
+"""Paint that runs along the grid does so within a degree."""
 
 
 class FrameMeasurement:
@@ -49,8 +54,10 @@ class FrameMeasurement:
             error_m += float(row[:FIRST_LINE] @ (x[:FIRST_LINE] - before))
         self._add(row, error_m, sight.sigma_m, sight.offset_per_tilt, sight.axis)
 
-    def add_turn(self, sight: LineSight, x: Matrix, rates: Rates) -> None:
-        """The heading held less the one that the line's direction tells."""
+    def add_turn(self, sight: LineSight, x: Matrix, p: Matrix, rates: Rates, shake_rad: float) -> None:
+        """The heading held less the one that the line's direction tells; nothing of a line that is askew: it
+        contradicts heading and tilt further than these are doubted, by the covariance `p` (n, n) of the state
+        and the camera's shaking.  A few degrees askew it would tell a tilt of as many, all the time."""
         row = np.zeros(len(x))
         by_roll, by_pitch = sight.turn_per_tilt
         row[PSI] = 1.0
@@ -58,7 +65,10 @@ class FrameMeasurement:
         row[MOUNT_ROLL], row[MOUNT_PITCH] = sight.turn_per_mount
         row[MOUNT_YAW] = 1.0
         row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
-        self._add(row, sight.turn_rad, sight.sigma_theta_rad, sight.turn_per_tilt, None)
+        shaken_rad = math.hypot(by_roll, by_pitch) * shake_rad
+        doubt_rad = math.sqrt(float(row @ p @ row) + sight.sigma_theta_rad**2 + shaken_rad**2)
+        if abs(sight.turn_rad) < max(_ASKEW_RAD, _ASKEW_SIGMAS * doubt_rad):
+            self._add(row, sight.turn_rad, sight.sigma_theta_rad, sight.turn_per_tilt, None)
 
     def _add(
         self, row: Matrix, error: float, sigma: float, by_tilt: tuple[float, float], axis: int | None

@@ -12,7 +12,7 @@ from flightd.config.tracking import MotionNoise, SensorPriors
 from flightd.core.learnt import Learnt
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.line_sight import FeatureSight, LineSight, Rates, feature_sight
-from flightd.tracking.motion_model import DELAY, FIRST_LINE, MOUNT_ROLL, PSI, PUSH_X, VX
+from flightd.tracking.motion_model import DELAY, FIRST_LINE, MOUNT_PITCH, MOUNT_ROLL, PITCH, PSI, PUSH_X, VX
 
 FRAME_NS = 33_333_333
 STILL = Rates(0.0, 0.0, 0.0)
@@ -106,6 +106,29 @@ def test_who_knows_no_line_any_more_still_knows_his_sensors() -> None:
     assert floor.mean(VX) == 0.0
     assert [floor.mean(state) for state in range(PUSH_X + 2, FIRST_LINE)] == before
     assert floor.held == []
+
+
+@pytest.mark.parametrize(("askew_deg", "most_deg"), [(0.0, 0.2), (3.0, 0.2), (-3.9, 0.2)])
+def test_a_line_askew_tells_no_tilt(askew_deg: float, most_deg: float) -> None:
+    """Beside one that is not: by its direction the drone would be pitched by three degrees for good."""
+    floor = FloorFilter(MotionNoise(), SensorPriors(), gate_m=0.35, forget_ns=10**9)
+    along, askew_per_pitch = (0.0, 1.6), (0.0, 0.4)
+    for step in range(150):
+        pitched_rad, psi_rad = floor.mean(PITCH) + floor.mean(MOUNT_PITCH), floor.mean(PSI)
+        straight = sight(-0.2 + 1.6 * pitched_rad)._replace(
+            offset_per_tilt=along, offset_per_mount=along, turn_rad=psi_rad, sigma_theta_rad=0.004
+        )
+        askew = sight(0.67)._replace(
+            axis=1,
+            turn_rad=psi_rad + 0.4 * pitched_rad + math.radians(askew_deg),
+            sigma_theta_rad=0.004,
+            turn_per_tilt=askew_per_pitch,
+            turn_per_mount=askew_per_pitch,
+        )
+        floor.predict(1 / 30, 0.0, 0.0, 0.0)
+        floor.update([straight, askew] if step >= 60 else [straight], STILL, step * FRAME_NS)
+    for state in (PITCH, MOUNT_PITCH, PSI):
+        assert abs(math.degrees(floor.mean(state))) < most_deg
 
 
 def test_a_line_is_placed_by_the_heading_that_its_own_frame_has_corrected() -> None:
