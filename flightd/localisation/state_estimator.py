@@ -149,8 +149,8 @@ class StateEstimator:
         self.response.sent(tick.now_ns, commanded if obeys else None)
         v = tick.vehicle
         self._risen = self._risen or (v is not None and v.may_fly)
-        # what levels itself by how it stands tells nothing of its legs
-        stands = v is not None and not self._risen and not v.hovers_unsteered
+        # once it is told to rise it may lean already; what levels itself by how it stands tells nothing of it
+        stands = v is not None and not (self._risen or v.hovers_unsteered) and commanded is None
         for sample in tick.attitudes:
             late_s = max((tick.now_ns - sample.stamp_ns) * 1e-9, 0.0)
             self._telemetry_s += _LATE_GAIN * (min(late_s, _MOST_LATE_S) - self._telemetry_s)
@@ -182,14 +182,16 @@ class StateEstimator:
     def _mind_standing(self, now_ns: int) -> None:
         tilt_rad = self._standing.at(now_ns)
         if self.armed and tilt_rad is not None:
-            self._stood_ns, self._level_rad = now_ns, self.tracker.stands(tilt_rad)
+            self._stood_ns = now_ns
+            self._level_rad = self.tracker.stands(tilt_rad) or self._level_rad
 
     def _level_at(self, now_ns: int) -> tuple[float, float]:
-        """Told roll and pitch of a drone that is level, as long as the error that was told on the ground
-        lasts; by what the picture makes of it later nobody flies blind."""
+        """Told roll and pitch of a drone that is level, by what was told while it stood: that error wanders,
+        and fades.  By what the picture makes of it later nobody flies blind."""
         lasts_s = self._config.tracking.expert.priors.attitude_s
-        stood = self._stood_ns and (now_ns - self._stood_ns) * 1e-9 < lasts_s
-        return self._level_rad if stood else (0.0, 0.0)
+        left = math.exp(-(now_ns - self._stood_ns) * 1e-9 / lasts_s)
+        roll_rad, pitch_rad = self._level_rad
+        return left * roll_rad, left * pitch_rad
 
     def _mind_jitter(self, late_s: float) -> None:
         late_s = min(max(late_s, 0.0), _MOST_JITTER_S)

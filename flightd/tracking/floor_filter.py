@@ -21,13 +21,13 @@ from flightd.config.tracking import MotionNoise, SensorPriors
 from flightd.core.geometry import Matrix
 from flightd.core.learnt import LearntSensors, estimate_of, whole_delay_sigma_s
 from flightd.core.tracks import SensorEstimate
+from flightd.tracking.delay_leap import DelayLeap
 from flightd.tracking.first_doubt import LEAST_HEIGHT_SHARE, drift_of, first_sigmas
 from flightd.tracking.forgotten_lines import FEATURE_NS, forgotten_features, forgotten_lines
 from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, placed
-from flightd.tracking.held_lines import SURE_HITS, HeldLine, associate, refound
+from flightd.tracking.held_lines import SURE_HITS, HeldLine, associate, refound, unsurveyed
 from flightd.tracking.innovations import Innovations
 from flightd.tracking.kalman import corrected, predicted
-from flightd.tracking.leap_test import SIDES, LeapTest
 from flightd.tracking.line_sight import FeatureSight, LineSight, Rates
 from flightd.tracking.motion_model import (
     DELAY,
@@ -52,6 +52,7 @@ from flightd.tracking.motion_model import (
     lean,
     moved,
 )
+from flightd.tracking.standing_tilt import tilt_error
 
 _UNSEEN_S = 0.1
 """An axis without a line for so long is dead-reckoned: the gust that was last felt on it fades."""
@@ -67,10 +68,6 @@ _MOST_LEAK_PER_S = 1.0
 _MOST_SCALE = 0.5
 _MOST_SIGMAS = 4.0
 """What is further off than so many sigmas of what was thought possible is not believed."""
-_USUAL_SIGMAS = 2.5
-_DELAY_LEAP_S = 0.02
-_SPENT = 0.5
-"""Share of a leap: what is left of it once the filter would have followed the rest."""
 _OUTLIER_SIGMAS = 3.0
 """What errs by more is weighed less (Huber)."""
 _FRESH, _TELLING, _FEATURE_SIGMAS = 3, 2, 4.0
@@ -110,9 +107,7 @@ class FloorFilter:
         self._steady, self._unseen_s, self._followed_ns = [0.0, 0.0], [0.0, 0.0], [0, 0]
         self._refused: set[int | None] = set()
         self._innovations = Innovations(priors.shake_rad, priors.shake_bounds_rad)
-        self.delay_leap = LeapTest(_DELAY_LEAP_S)
-        self._leapt: Matrix = np.zeros((FIRST_LINE, len(SIDES)))
-        """By what all states would err, had the delay leapt to either side when its test last began."""
+        self.delay_leap = DelayLeap()
 
     # What is known
 
@@ -206,21 +201,11 @@ class FloorFilter:
         self._begin_anew([VX, VY, PUSH_X, PUSH_Y])
 
     def stand_level(self, told_rad: tuple[float, float]) -> None:
-        """The drone stands in that roll and pitch, as they are told: they should be those of its legs.  One
-        leg on a cable leans it further than legs do: what is beyond `_USUAL_SIGMAS` says the less the further
-        it is (Hampel's estimator), beyond `_MOST_SIGMAS` nothing."""
+        """The drone stands in that roll and pitch, as they are told."""
         self._begin_anew([ROLL, PITCH])
         for state, tilt_rad in zip((ROLL, PITCH), told_rad, strict=True):
-            unknown = self._p.item(state, state)
-            spread = unknown + self._priors.stand_rad**2
-            sigmas = abs(tilt_rad) / math.sqrt(spread)
-            if not sigmas < _MOST_SIGMAS:
-                continue
-            fades = min((_MOST_SIGMAS - sigmas) / (_MOST_SIGMAS - _USUAL_SIGMAS), 1.0)
-            told = math.copysign(fades * min(sigmas, _USUAL_SIGMAS) * math.sqrt(spread), tilt_rad)
-            self._x[state] = -told * unknown / spread
-            if sigmas <= _USUAL_SIGMAS:
-                self._p[state, state] = unknown * (1.0 - unknown / spread)
+            error = tilt_error(tilt_rad, self._p.item(state, state), self._priors.stand_rad**2)
+            self._x[state], self._p[state, state] = error
 
     def forget(self) -> None:
         """Know no line and no motion any more; what was learnt of the sensors stays."""
@@ -247,8 +232,7 @@ class FloorFilter:
             self._drift[push] = noise.changed_mps2 if changed else noise.disturbance_mps2
         noise_q[_DIAGONAL] += self._drift**2 * dt_s
         self._p = predicted(self._p, step.jacobian, noise_q)
-        self._leapt = step.jacobian @ self._leapt
-        self.delay_leap.moved(self.mean(DELAY), self.sigma(DELAY), dt_s)
+        self.delay_leap.moved(step.jacobian, self.mean(DELAY), self.sigma(DELAY), dt_s)
         self._fade(dt_s)
 
     def update(
@@ -281,9 +265,7 @@ class FloorFilter:
         told = FrameMeasurement()
         for sight, line in known:
             told.add_offset(sight, line, self.held[line].lever_m, self._x, rates)
-        for sight in sights:
-            if not math.isnan(sight.turn_rad):
-                told.add_turn(sight, self._x, self._p, rates, self._innovations.shake_rad)
+        told.add_turns(sights, self._x, self._p, rates, self._innovations.shake_rad)
         self._take(told, self._unmoved(assumed=assumed, exact=exact), tested=not assumed)
         carried = FrameMeasurement()
         for sight, line in followed:
@@ -314,17 +296,8 @@ class FloorFilter:
     def survey(self, axis: int, places_m: Mapping[int, float], sigma_m: float) -> None:
         """Lines held, by their ids, are at such places on the map, whose distances are known to `sigma_m`.
         Each line is held against another one once: what the map errs by does not average out."""
-        known = [
-            (line, held) for line, held in enumerate(self.held) if held.axis == axis and held.id in places_m
-        ]
-        for line, held in known:
-            if held.surveyed or held.hits < SURE_HITS:
-                continue
-            others = [(at, other) for at, other in known if other.surveyed]
-            others = others or [(at, other) for at, other in known if at != line and other.hits >= SURE_HITS]
-            if not others:
-                continue
-            at, other = min(others, key=lambda one: self.sigma(FIRST_LINE + one[0]))
+        for line, at in unsurveyed(self.held, axis, places_m, lambda one: self.sigma(FIRST_LINE + one)):
+            held, other = self.held[line], self.held[at]
             apart_m = places_m[held.id] - places_m[other.id]
             row = self._between(line, at)
             off_m = float(row @ self._x) - apart_m
@@ -363,7 +336,7 @@ class FloorFilter:
 
     def _begin_anew(self, states: list[int]) -> None:
         """These are as unknown as at first, and nothing that is known says anything of them."""
-        self._x[states] = self._leapt[states] = 0.0
+        self._x[states] = self.delay_leap.off[states] = 0.0
         self._p[states, :] = 0.0
         self._p[:, states] = 0.0
         self._p[states, states] = self._first_sigmas[states] ** 2
@@ -377,7 +350,7 @@ class FloorFilter:
             if self._unseen_s[axis] > _UNSEEN_S:
                 self._x[push] = self.push_after(axis, dt_s)
                 kept = math.exp(-dt_s / self._noise.gust_s)  # and with the gust what is not known of it
-                self._leapt[push] *= kept
+                self.delay_leap.off[push] *= kept
                 self._p[push, :] *= kept
                 self._p[:, push] *= kept
             else:
@@ -452,33 +425,21 @@ class FloorFilter:
         self._bound(HEIGHT_SCALE, -_MOST_SCALE, _MOST_SCALE)
         self._bound(DELAY, -delay_s, min(delay_s, self._latency_s))  # no frame arrives before it is exposed
         if minded:
-            self._mind(errors, spread, by_tilt, measured.axes)
-        if tested:
-            self._test_delay(by_leap, errors, spread)
-
-    def _test_delay(self, by_leap: Matrix, errors: Matrix, spread: Matrix) -> None:
-        """What has leapt is as unknown as at first, and with it all that has been made of it since."""
-        test = self.delay_leap
-        side = test.contradicted(by_leap, errors, spread)
-        if side is not None:
-            off = self._leapt[:, side] * (self._priors.delay_s / test.leap)
-            self._p += np.outer(off, off)
-        for tried in range(len(SIDES)):
-            if abs(self._leapt.item(DELAY, tried)) < _SPENT * test.leap:
-                test.restart(tried)
-        for begun in test.begins:
-            self._leapt[:, begun] = 0.0
-            self._leapt[DELAY, begun] = -SIDES[begun] * test.leap
+            self._innovations.mind(errors, spread, by_tilt, measured.axes)
+        off = self.delay_leap.found(by_leap, errors, spread) if tested else None
+        if off is not None:  # as unknown as at first, and with it all that has been made of it since
+            self._p += np.outer(off, off) * self._priors.delay_s**2
 
     def _correct(
         self, rows: Matrix, errors: Matrix, noise: Matrix, unmoved: slice | list[int] | None = None
     ) -> tuple[Matrix, Matrix]:
         """Bring the errors (m,) to 0; (m, 2) what of them a leap of the delay would have made, and (m, m) how
         they were expected to spread."""
-        by_leap = rows @ self._leapt
-        states, off = np.column_stack((self._x, self._leapt)), np.column_stack((errors, by_leap))
+        leap = self.delay_leap
+        by_leap = rows @ leap.off
+        states, off = np.column_stack((self._x, leap.off)), np.column_stack((errors, by_leap))
         states, self._p, spread = corrected(states, self._p, rows, off, noise, unmoved)
-        self._x, self._leapt = states[:, 0].copy(), states[:, 1:]
+        self._x, leap.off = states[:, 0].copy(), states[:, 1:]
         return by_leap, spread
 
     def _bound_push(self) -> None:
@@ -487,14 +448,6 @@ class FloorFilter:
 
     def _bound(self, index: int, least: float, most: float) -> None:
         self._x[index] = min(max(self._x[index], least), most)
-
-    def _mind(self, errors: Matrix, spread: Matrix, by_tilt: Matrix, axes: list[int | None]) -> None:
-        told = errors / np.sqrt(np.diag(spread))
-        for axis in range(2):
-            mine = [-float(error) for error, of in zip(told, axes, strict=True) if of == axis]
-            if mine:
-                self._innovations.take(axis, sum(mine) / len(mine))
-        self._innovations.shaken(errors, spread, by_tilt)
 
     def _add(self, sight: LineSight, rates: Rates, stamp_ns: int, before: Matrix) -> None:
         """A line where it was seen, as wrong as everything by which it was placed; moved by what the frame
@@ -509,7 +462,7 @@ class FloorFilter:
         grown[n, n] = row @ self._p @ row + sight.sigma_m**2 + shaken
         offset_m = sight.offset_m + float(row[:FIRST_LINE] @ (self._x[:FIRST_LINE] - before))
         self._x, self._p = np.append(self._x, offset_m), grown
-        self._leapt = np.vstack((self._leapt, row @ self._leapt))
+        self.delay_leap.grow(row)
         self.held.append(
             HeldLine(
                 self._next_id,
@@ -542,5 +495,5 @@ class FloorFilter:
         kept = [line for line in range(len(self.held)) if line not in lines]
         rows = [*range(FIRST_LINE), *(FIRST_LINE + line for line in kept)]
         self._x, self._p = self._x[rows], self._p[np.ix_(rows, rows)]
-        self._leapt = self._leapt[rows]
+        self.delay_leap.keep(rows)
         self.held = [self.held[line] for line in kept]

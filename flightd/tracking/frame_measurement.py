@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from flightd.tracking.motion_model import (
 
 _ASKEW_RAD, _ASKEW_SIGMAS = math.radians(1.5), 4.0
 """Paint that runs along the grid does so within a degree."""
+_TILTS = [ROLL, PITCH, MOUNT_ROLL, MOUNT_PITCH]
 
 
 class FrameMeasurement:
@@ -54,21 +56,33 @@ class FrameMeasurement:
             error_m += float(row[:FIRST_LINE] @ (x[:FIRST_LINE] - before))
         self._add(row, error_m, sight.sigma_m, sight.offset_per_tilt, sight.axis)
 
-    def add_turn(self, sight: LineSight, x: Matrix, p: Matrix, rates: Rates, shake_rad: float) -> None:
-        """The heading held less the one that the line's direction tells; nothing of a line that is askew: it
-        contradicts heading and tilt further than these are doubted, by the covariance `p` (n, n) of the state
-        and the camera's shaking.  A few degrees askew it would tell a tilt of as many, all the time."""
-        row = np.zeros(len(x))
-        by_roll, by_pitch = sight.turn_per_tilt
-        row[PSI] = 1.0
-        row[ROLL], row[PITCH] = by_roll, by_pitch
-        row[MOUNT_ROLL], row[MOUNT_PITCH] = sight.turn_per_mount
-        row[MOUNT_YAW] = 1.0
-        row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
-        shaken_rad = math.hypot(by_roll, by_pitch) * shake_rad
-        doubt_rad = math.sqrt(float(row @ p @ row) + sight.sigma_theta_rad**2 + shaken_rad**2)
-        if abs(sight.turn_rad) < max(_ASKEW_RAD, _ASKEW_SIGMAS * doubt_rad):
-            self._add(row, sight.turn_rad, sight.sigma_theta_rad, sight.turn_per_tilt, None)
+    def add_turns(
+        self, sights: Sequence[LineSight], x: Matrix, p: Matrix, rates: Rates, shake_rad: float
+    ) -> None:
+        """The heading held less the one that each line's direction tells.
+
+        A line that contradicts heading and tilt further than they are doubted, by the covariance `p` (n, n)
+        of the state and the camera's shaking, is askew, or the heading is wrong.  It tells no tilt: it would
+        tell one of as many degrees, all the time; and nothing where more lines agree with the heading."""
+        turns = [(sight, _turn_row(sight, x, rates)) for sight in sights if not math.isnan(sight.turn_rad)]
+        doubts = [
+            math.sqrt(
+                float(row @ p @ row)
+                + sight.sigma_theta_rad**2
+                + (math.hypot(*sight.turn_per_tilt) * shake_rad) ** 2
+            )
+            for sight, row in turns
+        ]
+        agree = [
+            abs(sight.turn_rad) < max(_ASKEW_RAD, _ASKEW_SIGMAS * doubt)
+            for (sight, _), doubt in zip(turns, doubts, strict=True)
+        ]
+        outvoted = agree.count(True) > agree.count(False)
+        for (sight, row), agrees in zip(turns, agree, strict=True):
+            if not agrees:
+                row[_TILTS] = 0.0
+            if agrees or not outvoted:
+                self._add(row, sight.turn_rad, sight.sigma_theta_rad, sight.turn_per_tilt, None)
 
     def _add(
         self, row: Matrix, error: float, sigma: float, by_tilt: tuple[float, float], axis: int | None
@@ -103,4 +117,16 @@ def placed(sight: LineSight, x: Matrix, rates: Rates) -> Matrix:
     turning = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + by_yaw * rates.yaw_radps
     row[DELAY] = turning + x[VELOCITY[sight.axis]]
     row[SCALE], row[HEIGHT], row[HEIGHT_SCALE] = sight.offset_m - sight.axis_m, sight.offset_m, sight.offset_m
+    return row
+
+
+def _turn_row(sight: LineSight, x: Matrix, rates: Rates) -> Matrix:
+    """d(heading held less the one told) / d state: (n,)."""
+    row = np.zeros(len(x))
+    by_roll, by_pitch = sight.turn_per_tilt
+    row[PSI] = 1.0
+    row[ROLL], row[PITCH] = by_roll, by_pitch
+    row[MOUNT_ROLL], row[MOUNT_PITCH] = sight.turn_per_mount
+    row[MOUNT_YAW] = 1.0
+    row[DELAY] = by_roll * rates.roll_radps + by_pitch * rates.pitch_radps + rates.yaw_radps
     return row

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass
 
 from flightd.tracking.line_sight import LineSight
@@ -109,3 +109,18 @@ def refound(
         if best is not None:
             pairs.append((new, best))
     return pairs
+
+
+def unsurveyed(
+    held: Sequence[HeldLine], axis: int, ids: Container[int], sigma: Callable[[int], float]
+) -> Iterator[tuple[int, int]]:
+    """Places of the lines across an axis, of those `ids`, that were held against no other one yet, each with
+    that of the surest one to hold it against, by `sigma` of a line."""
+    known = [(line, one) for line, one in enumerate(held) if one.axis == axis and one.id in ids]
+    for line, one in known:
+        if one.surveyed or one.hits < SURE_HITS:
+            continue
+        others = [at for at, other in known if other.surveyed]
+        others = others or [at for at, other in known if at != line and other.hits >= SURE_HITS]
+        if others:
+            yield line, min(others, key=sigma)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from flightd.core.geometry import Matrix
@@ -17,8 +19,7 @@ _MOST_RATIO = 9.0
 
 
 class Innovations:
-    """Give `take` each frame's mean innovation along an axis, in units of its standard deviation, and
-    `shaken` all of them."""
+    """Give `mind` all of each frame."""
 
     def __init__(self, shake_rad: float, bounds_rad: tuple[float, float]) -> None:
         self._bounds_rad = bounds_rad
@@ -37,6 +38,16 @@ class Innovations:
     def one_sided(self, axis: int) -> bool:
         """Whether all lines across the axis err to one side lately."""
         return abs(self._bias[axis]) > _BIASED
+
+    def mind(self, errors: Matrix, spread: Matrix, by_tilt: Matrix, axes: Sequence[int | None]) -> None:
+        """Take all of one frame (m,), expected to have the covariance (m, m), with their derivative (m, 2) by
+        roll and pitch; `axes` are those across which each tells an offset, None: a direction."""
+        told = errors / np.sqrt(np.diag(spread))
+        for axis in range(2):
+            mine = [-float(error) for error, of in zip(told, axes, strict=True) if of == axis]
+            if mine:
+                self.take(axis, sum(mine) / len(mine))
+        self.shaken(errors, spread, by_tilt)
 
     def take(self, axis: int, mean: float) -> None:
         self._bias[axis] += _BIAS_GAIN * (mean - self._bias[axis])

@@ -24,13 +24,10 @@ class LeapTest:
 
     What is known has moved by as much.  Or the measurements contradict what is known and cannot move it as
     fast: Page's test (Biometrika 41, 1954), to either of `SIDES`, sums up the likelihood ratio of a state
-    that has leapt; the sum falls while they agree with what is known, or with less than half a leap.  A leap
-    makes of a filter's innovations what it makes of the measurements, less what the filter has explained by
-    other states meanwhile: whoever asks follows that (Willsky and Jones, IEEE Trans. Automatic Control 21,
-    1976) from when the sum was 0."""
+    that has leapt; the sum falls while they agree with what is known, or with less than half a leap."""
 
     def __init__(self, leap: float) -> None:
-        self.leap = leap
+        self._leap = leap
         self._sums = [0.0, 0.0]
         self._lately = self._sigma = math.nan
         self._known_s = 0.0
@@ -45,7 +42,7 @@ class LeapTest:
     def moved(self, known: float, sigma: float, dt_s: float) -> None:
         """What is known after `dt_s`; what is not known to half a leap can do none, and what moves no further
         than it was doubted lately is still being learnt."""
-        if sigma > 0.5 * self.leap:
+        if sigma > 0.5 * self._leap:
             self._begin()
             return
         self._known_s += dt_s
@@ -54,7 +51,7 @@ class LeapTest:
         part = min(dt_s / _FOLLOWS_S, 1.0)
         self._lately += part * (known - self._lately)
         self._sigma += part * (sigma - self._sigma)
-        far = max(self.leap, _SIGMAS * self._sigma)
+        far = max(self._leap, _SIGMAS * self._sigma)
         if self._known_s >= _KNOWN_S and abs(known - self._lately) > far:
             self._begin()
             self.leaps += 1

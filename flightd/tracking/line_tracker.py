@@ -20,6 +20,7 @@ from flightd.core.types import Attitude, LineSet
 from flightd.tracking.attitude_history import AttitudeHistory
 from flightd.tracking.carried_heading import CarriedHeading
 from flightd.tracking.carried_motion import NO_LEAD, ExposureMotion, Lead
+from flightd.tracking.corrected_view import corrected_attitude, corrected_lens, corrected_mount
 from flightd.tracking.feature_trust import FeatureTrust
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.ground_junctions import floor_junctions
@@ -39,9 +40,6 @@ from flightd.tracking.motion_model import (
     DELAY,
     HEIGHT,
     HEIGHT_SCALE,
-    MOUNT_PITCH,
-    MOUNT_ROLL,
-    MOUNT_YAW,
     PITCH,
     PSI,
     ROLL,
@@ -192,11 +190,12 @@ class LineTracker:
             offset = wrap_pi(self._start_yaw_rad - carried.yaw_rad)
             self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
 
-    def stands(self, told_rad: tuple[float, float]) -> tuple[float, float]:
-        """The drone has not risen yet, and stands in that roll and pitch (rad) as they are told; returned are
-        those in which it is believed to be level.  Once lines have told of the attitude, it says no more."""
-        if not self._lines_ns:
-            self._filter.stand_level(told_rad)
+    def stands(self, told_rad: tuple[float, float]) -> tuple[float, float] | None:
+        """The drone stands in that roll and pitch, as they are told; returns those of a drone that is level,
+        None once lines have told of the attitude: then it is no measurement of its own any more."""
+        if self._lines_ns:
+            return None
+        self._filter.stand_level(told_rad)
         return -self._filter.mean(ROLL), -self._filter.mean(PITCH)
 
     def exposed_ns(self, lines: LineSet) -> int:
@@ -227,7 +226,7 @@ class LineTracker:
         self._stands = self._stands and height_m < _HARDLY_RISEN_M
         self._filter.height_known_to(height_sigma_m / height_m)
         self._advance(stamp_ns)
-        view = self._view(attitude, stamp_ns, height_m, self._corrected_lens())
+        view = self._view(attitude, stamp_ns, height_m, corrected_lens(self._lens, self._filter))
         lines = self._as_of_one_moment(lines, attitude, stamp_ns, height_m)
         params, assumed = self._params, self._history.is_assumed(stamp_ns)
         low, high = (share * self._line_width_m for share in params.width_share)
@@ -266,8 +265,10 @@ class LineTracker:
         held = self._filter
         velocity = held.mean(VX), held.mean(VY)
         yaw = attitude.yaw_rad + held.mean(PSI)
-        motion = ImageMotion.of(self._rates(stamp_ns), velocity, yaw, height_m, self._corrected_mount())
-        return as_of_one_moment(lines, self._corrected_lens(), motion, self._readout_s)
+        motion = ImageMotion.of(
+            self._rates(stamp_ns), velocity, yaw, height_m, corrected_mount(self._mount, self._filter)
+        )
+        return as_of_one_moment(lines, corrected_lens(self._lens, self._filter), motion, self._readout_s)
 
     def exposure_motion(self, now_ns: int) -> ExposureMotion | None:
         """What the newest frame tells of the motion; None where it was laid over an attitude that was only
@@ -450,28 +451,11 @@ class LineTracker:
         sigma_tilt_rad = 0.0 if self._compensation is TiltCompensation.EXACT else self._params.sigma_tilt_rad
         if self._history.is_assumed(stamp_ns):
             sigma_tilt_rad = _ASSUMED_TILT_RAD
-        mount, corrected = self._corrected_mount(), self._corrected(attitude)
-        return FloorView(lens, mount, corrected, height_m, self._compensation, sigma_tilt_rad)
-
-    def _corrected_lens(self) -> Lens:
-        """The camera's lens, by what has been learnt of its focal length."""
-        return self._lens.longer_by(1.0 / (1.0 + self._filter.mean(SCALE)))
-
-    def _corrected(self, told: Attitude) -> Attitude:
-        """The attitude, by what has been learnt of it."""
-        held = self._filter
-        roll, pitch = told.roll_rad + held.mean(ROLL), told.pitch_rad + held.mean(PITCH)
-        return Attitude(told.stamp_ns, roll, pitch, told.yaw_rad, told.yaw_rate_radps)
-
-    def _corrected_mount(self) -> Mount:
-        """The camera's mount, by what has been learnt of it."""
-        held, mount = self._filter, self._mount
-        return Mount(
-            mount.yaw_rad + held.mean(MOUNT_YAW),
-            mount.offset_m,
-            mount.roll_rad + held.mean(MOUNT_ROLL),
-            mount.pitch_rad + held.mean(MOUNT_PITCH),
+        mount, corrected = (
+            corrected_mount(self._mount, self._filter),
+            corrected_attitude(attitude, self._filter),
         )
+        return FloorView(lens, mount, corrected, height_m, self._compensation, sigma_tilt_rad)
 
     def _rates(self, stamp_ns: int) -> Rates:
         before, after = self._history.at(stamp_ns - _RATE_NS), self._history.at(stamp_ns + _RATE_NS)

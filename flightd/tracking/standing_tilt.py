@@ -14,6 +14,9 @@ _STANDS_S = 1.0
 """It stands once it has been still for so long."""
 _GAP_S = 1.0
 """In so long without a sample somebody may have moved it."""
+_USUAL_SIGMAS, _MOST_SIGMAS = 2.5, 4.0
+"""Legs lean a drone by no more, one that stands on a cable does: what is further off says the less the
+further it is (Hampel's estimator), and at last nothing."""
 
 
 class StandingTilt:
@@ -47,3 +50,16 @@ class StandingTilt:
         part = min(dt_s / _MEAN_S, 1.0)
         self._roll_rad += part * off_roll_rad
         self._pitch_rad += part * off_pitch_rad
+
+
+def tilt_error(told_rad: float, variance: float, stand_variance: float) -> tuple[float, float]:
+    """By what a roll or pitch is told too small (rad) of a drone that stands, and the variance of that; it is
+    told so, and was unknown by `variance`, the legs' tilt is by `stand_variance` (rad^2)."""
+    spread = variance + stand_variance
+    sigmas = abs(told_rad) / math.sqrt(spread)
+    if not sigmas < _MOST_SIGMAS:
+        return 0.0, variance
+    share = variance / spread
+    fades = min((_MOST_SIGMAS - sigmas) / (_MOST_SIGMAS - _USUAL_SIGMAS), 1.0)
+    error_rad = -math.copysign(fades * min(sigmas, _USUAL_SIGMAS) * math.sqrt(spread) * share, told_rad)
+    return error_rad, variance * (1.0 - share) if sigmas <= _USUAL_SIGMAS else variance

@@ -47,27 +47,6 @@ def test_a_landing_that_never_was_low_and_a_hover_lean_as_they_have_to() -> None
     assert min(leans_deg(Phase.HOVER, [0.4, math.nan])) > 8.0
 
 
-def test_level_is_the_attitude_that_is_told_of_a_level_drone() -> None:
-    config, flight = configured(), Flight()
-    steering = Steering(config.control, PlausibilityMonitor(SITE, config))
-    flight.to(Phase.FOLLOW)
-    assert flight.guidance is not None
-    inputs, level, aslant = flight.inputs, (0.02, -0.01), (0.5, -0.5)
-    leans = []
-    for level_rad in (level, aslant):
-        for _ in range(100):
-            inputs = replace(inputs, now_ns=inputs.now_ns + TICK_NS)
-            guidance, conditions = (
-                replace(flight.guidance, guide=Guide.LEVEL),
-                Conditions(level_rad=level_rad),
-            )
-            setpoint = steering.step(inputs, guidance, (0.0, 0.0), 0.0, conditions=conditions)
-        assert setpoint is not None
-        leans.append((setpoint.roll_rad, setpoint.pitch_rad))
-    assert leans[0] == pytest.approx(level)
-    assert max(map(abs, leans[1])) <= config.control.max_tilt_rad + 1e-9, "limits come last"
-
-
 def test_while_it_is_not_known_how_late_pictures_are_a_lean_changes_more_slowly() -> None:
     config, flight = configured(), Flight()
     flight.to(Phase.FOLLOW)

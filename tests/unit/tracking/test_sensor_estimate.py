@@ -119,10 +119,21 @@ def test_who_stands_tells_the_error_of_the_told_attitude_as_far_as_legs_are_leve
     spread = priors.attitude_rad**2 + priors.stand_rad**2
     share = priors.attitude_rad**2 / spread
     assert level_rad == pytest.approx((share * told_rad[0], share * told_rad[1]))
-    leans_rad = [tracker.stands((math.sqrt(spread) * sigmas, 0.0))[0] for sigmas in (2.5, 3.0, 3.9, 4.1, 9.0)]
+    leans_rad = list[float]()
+    for sigmas in (2.5, 3.0, 3.9, 4.1, 9.0):
+        level_rad = tracker.stands((math.sqrt(spread) * sigmas, 0.0))
+        assert level_rad is not None
+        leans_rad.append(level_rad[0])
     assert leans_rad == sorted(leans_rad, reverse=True), "the more a leg on something explains it"
     assert leans_rad[0] == pytest.approx(2.5 * math.sqrt(spread) * share)
     assert leans_rad[3:] == [0.0, 0.0]
+
+
+def test_once_lines_have_told_of_the_attitude_standing_says_no_more() -> None:
+    seen = list[tuple[float, float] | None]()
+    told(Truth(), 1, 1.0, lambda tracker, _: seen.append(tracker.stands((0.02, 0.0))))
+    assert seen[-1] is None
+    assert LineTracker(LENS, Mount(), SITE.line_width_m, 0.0).stands((0.02, 0.0)) is not None
 
 
 def never_leaps(tracker: LineTracker, t: float) -> None:

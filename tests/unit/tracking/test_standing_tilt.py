@@ -11,8 +11,6 @@ from flightd.core.types import Attitude
 from flightd.tracking.standing_tilt import StandingTilt
 
 ROLL, PITCH = math.radians(1.2), math.radians(-0.8)
-
-
 BEGAN_NS = 1_000_000_000
 
 
