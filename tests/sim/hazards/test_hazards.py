@@ -148,7 +148,10 @@ TRIALS: dict[str, Trial] = {
     "camera_blind": Trial(fault(blank=True)),
     "frames_stale": Trial(fault(late_ns=900_000_000)),
     "camera_gone": Trial(fault(blind=True), fault(blind=False), 1.0, ends=Phase.DONE),
-    "delay_leapt": Trial(fault(delay_ns=-33_000_000), ends=Phase.DONE, found_s=2.0),
+    # later than the others: what is only just known does not leap
+    "delay_leapt": Trial(
+        fault(delay_ns=-33_000_000), ends=Phase.DONE, found_s=2.0, visits=("A4", "A3", "A1")
+    ),
     "detector_killed": Trial(fault(health=Health(0.08, 1)), ends=Phase.DONE, found_s=0.05),
     "detector_hung": Trial(fault(health=Health(0.08, 2)), ends=Phase.DONE, found_s=0.05),
     "overload": Trial(fault(health=Health(0.4)), found_s=3.2),
