@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from flightd.config.schema import Config
 from flightd.control.flight_controller import CALM, Conditions
@@ -285,7 +285,7 @@ class StateEstimator:
         tracker, response = self.tracker, self.response
         seen_ns = tracker.newest_ns
         if not seen_ns:
-            return replace(CALM, level_rad=self._level_at(now_ns))
+            return Conditions(level_rad=self._level_at(now_ns))
         late_s = min(max((now_ns - seen_ns) * 1e-9, 0.0), _MOST_LATE_S)
         self._frames_s += _LATE_GAIN * (late_s - self._frames_s)
         slower_s = max(2.0 / response.bandwidth_radps - _ATTITUDE_LAG_S, 0.0)

@@ -52,10 +52,10 @@ class DelayLeap:
         side would have made."""
         side = self.test.contradicted(by_leap, errors, spread)
         off = None if side is None else self.off[:, side] / _LEAP_S
-        for tried in range(len(SIDES)):
+        for tried, sign in enumerate(SIDES):
             if abs(self.off.item(DELAY, tried)) < _SPENT * _LEAP_S:
                 self.test.restart(tried)
-        for begun in self.test.begins:
-            self.off[:, begun] = 0.0
-            self.off[DELAY, begun] = -SIDES[begun] * _LEAP_S
+            if tried in self.test.begins:
+                self.off[:, tried] = 0.0
+                self.off[DELAY, tried] = -sign * _LEAP_S
         return off

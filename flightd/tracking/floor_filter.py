@@ -67,7 +67,7 @@ _MOST_HEIGHT_SHARE = 0.05
 _MOST_LEAK_PER_S = 1.0
 _MOST_SCALE = 0.5
 _MOST_SIGMAS = 4.0
-"""What is further off than so many sigmas of what was thought possible is not believed."""
+"""A delay further off than so many sigmas of what was thought possible is not believed."""
 _OUTLIER_SIGMAS = 3.0
 """What errs by more is weighed less (Huber)."""
 _FRESH, _TELLING, _FEATURE_SIGMAS = 3, 2, 4.0
@@ -265,7 +265,7 @@ class FloorFilter:
         told = FrameMeasurement()
         for sight, line in known:
             told.add_offset(sight, line, self.held[line].lever_m, self._x, rates)
-        told.add_turns(sights, self._x, self._p, rates, self._innovations.shake_rad)
+        told.add_turns(sights, self._x, self._p, rates, self._innovations)
         self._take(told, self._unmoved(assumed=assumed, exact=exact), tested=not assumed)
         carried = FrameMeasurement()
         for sight, line in followed:
@@ -365,8 +365,7 @@ class FloorFilter:
         if abs(apart_m) > self._gate_m:
             return apart_m, 0.0
         row, _ = offset_error(sight, line, self.held[line].lever_m, self._x, rates)
-        by_roll, by_pitch = sight.offset_per_tilt
-        shaken = (by_roll**2 + by_pitch**2) * self._innovations.shake_rad**2
+        shaken = self._innovations.shake_variance(sight.offset_per_tilt)
         return apart_m, math.sqrt(max(float(row @ self._p @ row), 0.0) + sight.sigma_m**2 + shaken)
 
     def _unmoved(self, *, assumed: bool, exact: bool) -> slice | list[int] | None:
@@ -457,8 +456,7 @@ class FloorFilter:
         grown = np.zeros((n + 1, n + 1))
         grown[:n, :n] = self._p
         grown[n, :n] = grown[:n, n] = self._p @ row
-        by_roll, by_pitch = sight.offset_per_tilt
-        shaken = (by_roll**2 + by_pitch**2) * self._innovations.shake_rad**2
+        shaken = self._innovations.shake_variance(sight.offset_per_tilt)
         grown[n, n] = row @ self._p @ row + sight.sigma_m**2 + shaken
         offset_m = sight.offset_m + float(row[:FIRST_LINE] @ (self._x[:FIRST_LINE] - before))
         self._x, self._p = np.append(self._x, offset_m), grown

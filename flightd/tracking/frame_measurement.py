@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flightd.core.geometry import Matrix
+from flightd.tracking.innovations import Innovations
 from flightd.tracking.line_sight import LineSight, Rates
 from flightd.tracking.motion_model import (
     DELAY,
@@ -57,7 +58,7 @@ class FrameMeasurement:
         self._add(row, error_m, sight.sigma_m, sight.offset_per_tilt, sight.axis)
 
     def add_turns(
-        self, sights: Sequence[LineSight], x: Matrix, p: Matrix, rates: Rates, shake_rad: float
+        self, sights: Sequence[LineSight], x: Matrix, p: Matrix, rates: Rates, innovations: Innovations
     ) -> None:
         """The heading held less the one that each line's direction tells.
 
@@ -65,18 +66,11 @@ class FrameMeasurement:
         of the state and the camera's shaking, is askew, or the heading is wrong.  It tells no tilt: it would
         tell one of as many degrees, all the time; and nothing where more lines agree with the heading."""
         turns = [(sight, _turn_row(sight, x, rates)) for sight in sights if not math.isnan(sight.turn_rad)]
-        doubts = [
-            math.sqrt(
-                float(row @ p @ row)
-                + sight.sigma_theta_rad**2
-                + (math.hypot(*sight.turn_per_tilt) * shake_rad) ** 2
-            )
-            for sight, row in turns
-        ]
-        agree = [
-            abs(sight.turn_rad) < max(_ASKEW_RAD, _ASKEW_SIGMAS * doubt)
-            for (sight, _), doubt in zip(turns, doubts, strict=True)
-        ]
+        agree = []
+        for sight, row in turns:
+            shaken = innovations.shake_variance(sight.turn_per_tilt)
+            doubt_rad = math.sqrt(float(row @ p @ row) + sight.sigma_theta_rad**2 + shaken)
+            agree.append(abs(sight.turn_rad) < max(_ASKEW_RAD, _ASKEW_SIGMAS * doubt_rad))
         outvoted = agree.count(True) > agree.count(False)
         for (sight, row), agrees in zip(turns, agree, strict=True):
             if not agrees:

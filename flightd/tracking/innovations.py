@@ -39,6 +39,11 @@ class Innovations:
         """Whether all lines across the axis err to one side lately."""
         return abs(self._bias[axis]) > _BIASED
 
+    def shake_variance(self, by_tilt: tuple[float, float]) -> float:
+        """What that shaking adds to the variance of what changes by so much per radian of roll and pitch."""
+        by_roll, by_pitch = by_tilt
+        return (by_roll**2 + by_pitch**2) * self.shake_rad**2
+
     def mind(self, errors: Matrix, spread: Matrix, by_tilt: Matrix, axes: Sequence[int | None]) -> None:
         """Take all of one frame (m,), expected to have the covariance (m, m), with their derivative (m, 2) by
         roll and pitch; `axes` are those across which each tells an offset, None: a direction."""

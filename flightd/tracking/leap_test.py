@@ -13,6 +13,7 @@ _KNOWN_S = 5.0
 """What has not been known for so long is still being learnt: what is learnt at first errs, and is put
 right."""
 _SIGMAS = 3.0
+"""What moves by no more of its own doubt is being learnt."""
 _FOLLOWS_S = 3.0
 """What comes to be known otherwise more slowly than this has not leapt."""
 _RATIO = 13.0

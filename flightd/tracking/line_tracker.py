@@ -265,10 +265,9 @@ class LineTracker:
         held = self._filter
         velocity = held.mean(VX), held.mean(VY)
         yaw = attitude.yaw_rad + held.mean(PSI)
-        motion = ImageMotion.of(
-            self._rates(stamp_ns), velocity, yaw, height_m, corrected_mount(self._mount, self._filter)
-        )
-        return as_of_one_moment(lines, corrected_lens(self._lens, self._filter), motion, self._readout_s)
+        lens, mount = corrected_lens(self._lens, held), corrected_mount(self._mount, held)
+        motion = ImageMotion.of(self._rates(stamp_ns), velocity, yaw, height_m, mount)
+        return as_of_one_moment(lines, lens, motion, self._readout_s)
 
     def exposure_motion(self, now_ns: int) -> ExposureMotion | None:
         """What the newest frame tells of the motion; None where it was laid over an attitude that was only
@@ -451,10 +450,8 @@ class LineTracker:
         sigma_tilt_rad = 0.0 if self._compensation is TiltCompensation.EXACT else self._params.sigma_tilt_rad
         if self._history.is_assumed(stamp_ns):
             sigma_tilt_rad = _ASSUMED_TILT_RAD
-        mount, corrected = (
-            corrected_mount(self._mount, self._filter),
-            corrected_attitude(attitude, self._filter),
-        )
+        mount = corrected_mount(self._mount, self._filter)
+        corrected = corrected_attitude(attitude, self._filter)
         return FloorView(lens, mount, corrected, height_m, self._compensation, sigma_tilt_rad)
 
     def _rates(self, stamp_ns: int) -> Rates:
