@@ -51,7 +51,7 @@ class MissionExpert(Section):
         0.45,
         ge=0,
         le=5,
-        description="from here a take-off steers by the lines; none is judged below",
+        description="from here a take-off steers, or brakes, by what it sees; none is judged below",
     )
     touch_below_m: float = Field(0.35, gt=0, le=5, description="the last stretch of a landing begins here")
     touch_mps: float = Field(0.20, gt=0, le=1, description="rate of the last stretch of a landing")

@@ -187,7 +187,7 @@ class StateEstimator:
 
     def _level_at(self, now_ns: int) -> tuple[float, float]:
         """Told roll and pitch of a drone that is level, by what was told while it stood: that error wanders,
-        and fades.  By what the picture makes of it later nobody flies blind."""
+        and fades.  By what the picture makes of it later nobody flies level."""
         lasts_s = self._config.tracking.expert.priors.attitude_s
         left = math.exp(-(now_ns - self._stood_ns) * 1e-9 / lasts_s)
         roll_rad, pitch_rad = self._level_rad

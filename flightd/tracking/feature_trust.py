@@ -1,57 +1,112 @@
-"""Whether the features that are followed lie on the floor: where lines tell the motion, they have to agree.
+"""Whether the features that are followed lie on the floor: they have to move as the lines beside them do.
 
 Most of what a down camera shows may be none of the floor: the drone's own shadow, a cable, dust on the lens,
 lamps mirrored in a glossy floor.  All of that moves otherwise than the floor does, or not at all.
+
+All is compared as angles seen from the drone.  What flies along stays where it is in the picture, however
+the drone climbs; what lies on the floor moves with the line, and in a climb towards the point below.  A
+camera that shakes moves both alike: so features are held against the line as it was seen, and what they lag
+behind it against the way that the filter has gone, which does not shake.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections import deque
+from collections.abc import Collection, Mapping
 from statistics import median
+from typing import NamedTuple
+
+from flightd.tracking.held_lines import SeenLine
 
 _FEWEST = 3
-_KEPT_NS = 300_000_000
-_FADE = 0.99
+_LEAST_NS, _MOST_NS = 90_000_000, 500_000_000
+"""Each frame is held against the newest one that is so old."""
+_MOST_FRAMES = 64
+_FADE = 0.98
 """Of what was seen before, with each frame in which the drone moved."""
-_ENOUGH_M2 = 0.002
-"""Sum of squared ways, per frame: nine frames at half a metre a second."""
-_LEAST, _MOST = 0.6, 1.5
-"""Of the way that the lines tell."""
-_STILL_M = 0.003
+_ENOUGH_FRAMES, _ENOUGH = 4, 0.0008
+"""So many ways along an axis, and as much in all of squared ways, rad2."""
+_LEAST, _MOST = -0.4, 0.5
+"""By how much of the way features may lag behind the line, or go further."""
+_LEAST_GONE, _MOST_GONE = 0.5, 2.0
+"""The share of the filter's way that the line has to have gone as it was seen: else neither is one."""
+_STILL_RAD = 0.01
+"""Features and lines are seen to a quarter of that."""
+_LOWEST_M = 0.3
+"""Further down the height is not told well enough for angles."""
+
+_Place = tuple[float, float]
+
+
+class SeenFrame(NamedTuple):
+    """One frame: its stamp, the height from which it was seen, m, the places of features and the lines by
+    their ids, m, along the grid axes from the drone, and its speed along each axis by lines, None where none
+    tells it."""
+
+    stamp_ns: int
+    height_m: float
+    features: Mapping[int, _Place]
+    lines: Mapping[int, SeenLine]
+    speeds_mps: tuple[float | None, float | None]
 
 
 class FeatureTrust:
     """Call `step` with each frame."""
 
     def __init__(self) -> None:
-        self._last: dict[int, tuple[int, tuple[float, float]]] = {}
-        self._together = self._squares = 0.0
+        self._frames: deque[SeenFrame] = deque(maxlen=_MOST_FRAMES)
+        self._counted = 0
+        self._squares = self._by_lines = self._beyond = 0.0
 
     @property
     def holds(self) -> bool:
         """Whether features lately moved as the lines did; not before that was seen."""
-        return self._squares > _ENOUGH_M2 and _LEAST < self._together / self._squares < _MOST
+        if self._counted < _ENOUGH_FRAMES or self._squares < _ENOUGH:
+            return False
+        moved = _LEAST_GONE < self._by_lines / self._squares < _MOST_GONE
+        return moved and _LEAST < self._beyond / self._squares < _MOST
 
-    def step(
-        self, seen: Mapping[int, tuple[float, float]], speeds_mps: Sequence[float | None], stamp_ns: int
-    ) -> None:
-        """Take the features' places (m, along the grid axes, from the drone) and the drone's speed along
-        each axis, None where no line tells it."""
-        ways: list[tuple[float, float, float]] = []
-        for id_, place in seen.items():
-            if id_ in self._last:
-                then_ns, was = self._last[id_]
-                ways.append(((stamp_ns - then_ns) * 1e-9, was[0] - place[0], was[1] - place[1]))
-        if len(ways) >= _FEWEST:
-            for axis, speed_mps in enumerate(speeds_mps):
-                if speed_mps is not None:
-                    way_m = speed_mps * median(way[0] for way in ways)
-                    self._compare(way_m, median(way[1 + axis] for way in ways))
-        self._last = {id_: at for id_, at in self._last.items() if stamp_ns - at[0] < _KEPT_NS}
-        self._last |= {id_: (stamp_ns, place) for id_, place in seen.items()}
-
-    def _compare(self, way_m: float, told_m: float) -> None:
-        if abs(way_m) < _STILL_M:
+    def step(self, now: SeenFrame) -> None:
+        """Take a frame."""
+        frames = self._frames
+        while frames and now.stamp_ns - frames[0].stamp_ns > _MOST_NS:
+            frames.popleft()
+        if not now.height_m > _LOWEST_M:
             return
-        self._together = _FADE * self._together + way_m * told_m
-        self._squares = _FADE * self._squares + way_m * way_m
+        for then in reversed(frames):
+            # one detector follows what another one does not
+            known = now.features.keys() & then.features.keys()
+            if now.stamp_ns - then.stamp_ns >= _LEAST_NS and len(known) >= _FEWEST:
+                for axis in range(2):
+                    self._compare(axis, then, now, known)
+                break
+        frames.append(now)
+
+    def _compare(self, axis: int, then: SeenFrame, now: SeenFrame, known: Collection[int]) -> None:
+        """Hold the way of the `known` features, as an angle, against that of the floor where they are."""
+        speed_mps, way_m = now.speeds_mps[axis], _by_lines_m(axis, then, now)
+        if speed_mps is None or math.isnan(way_m):
+            return
+        over_s = (now.stamp_ns - then.stamp_ns) * 1e-9
+        was_rad = median(then.features[id_][axis] for id_ in known) / then.height_m
+        is_rad = median(now.features[id_][axis] for id_ in known) / now.height_m
+        climbed_rad = was_rad * (now.height_m - then.height_m) / now.height_m
+        way_rad = way_m / now.height_m + climbed_rad
+        gone_rad = speed_mps * over_s / now.height_m + climbed_rad
+        if abs(gone_rad) < _STILL_RAD:
+            return
+        self._counted += 1
+        self._squares = _FADE * self._squares + gone_rad**2
+        self._by_lines = _FADE * self._by_lines + gone_rad * way_rad
+        self._beyond = _FADE * self._beyond + gone_rad * (was_rad - is_rad - way_rad)
+
+
+def _by_lines_m(axis: int, then: SeenFrame, now: SeenFrame) -> float:
+    """How far the drone came across the axis by the lines in both frames, m; NaN where they do not tell."""
+    ways = [
+        then.lines[id_].offset_m - line.offset_m
+        for id_, line in now.lines.items()
+        if line.axis == axis and line.sure and id_ in then.lines
+    ]
+    return median(ways) if ways else math.nan

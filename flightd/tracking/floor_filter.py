@@ -25,7 +25,7 @@ from flightd.tracking.delay_leap import DelayLeap
 from flightd.tracking.first_doubt import LEAST_HEIGHT_SHARE, drift_of, first_sigmas
 from flightd.tracking.forgotten_lines import FEATURE_NS, forgotten_features, forgotten_lines
 from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, placed
-from flightd.tracking.held_lines import SURE_HITS, HeldLine, associate, refound, unsurveyed
+from flightd.tracking.held_lines import SURE_HITS, HeldLine, SeenLine, associate, refound, unsurveyed
 from flightd.tracking.innovations import Innovations
 from flightd.tracking.kalman import corrected, predicted
 from flightd.tracking.line_sight import FeatureSight, LineSight, Rates
@@ -185,6 +185,11 @@ class FloorFilter:
         x, y = (self.mean(VX + axis) if self.tells(axis, seen) else None for axis in range(2))
         return x, y
 
+    def lines_seen(self, stamp_ns: int) -> dict[int, SeenLine]:
+        """The lines seen in the frame of that time, by their ids."""
+        seen = (one for one in self.held if one.feature is None and one.seen_ns == stamp_ns)
+        return {one.id: SeenLine(one.axis, one.sight_m, one.hits >= SURE_HITS) for one in seen}
+
     def turn_to(self, offset_rad: float, sigma_rad: float) -> None:
         """The heading offset is another one, and all that it was correlated with is no longer."""
         self._begin_anew([PSI, PSI_RATE])
@@ -277,9 +282,7 @@ class FloorFilter:
             if held.feature is not None:
                 self._followed_ns[held.axis] = stamp_ns
             self._unseen_s[held.axis] = 0.0
-            held.seen_ns, held.hits = stamp_ns, held.hits + 1
-            held.width_m += 0.2 * (sight.width_m - held.width_m)
-            held.from_m, held.to_m = sight.from_m, sight.to_m
+            held.take(sight, stamp_ns)
         self._refind([line for _, line in known], stamp_ns)
         for sight in fresh:
             self._add(sight, rates, stamp_ns, before)
@@ -332,7 +335,8 @@ class FloorFilter:
         self._bound_push()
         kept, found = self.held[old], self.held[new]
         kept.seen_ns, kept.hits, kept.width_m = found.seen_ns, kept.hits + found.hits, found.width_m
-        kept.from_m, kept.to_m, kept.lever_m = found.from_m, found.to_m, found.lever_m
+        kept.from_m, kept.to_m = found.from_m, found.to_m
+        kept.lever_m, kept.sight_m = found.lever_m, found.sight_m
 
     def _begin_anew(self, states: list[int]) -> None:
         """These are as unknown as at first, and nothing that is known says anything of them."""
@@ -461,18 +465,7 @@ class FloorFilter:
         offset_m = sight.offset_m + float(row[:FIRST_LINE] @ (self._x[:FIRST_LINE] - before))
         self._x, self._p = np.append(self._x, offset_m), grown
         self.delay_leap.grow(row)
-        self.held.append(
-            HeldLine(
-                self._next_id,
-                sight.axis,
-                sight.width_m,
-                stamp_ns,
-                sight.from_m,
-                sight.to_m,
-                offset_m,
-                feature=sight.feature,
-            )
-        )
+        self.held.append(HeldLine.first(self._next_id, sight, stamp_ns, offset_m))
         self._next_id += 1
 
     def _forget_old(self, stamp_ns: int) -> None:

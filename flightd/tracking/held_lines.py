@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from flightd.tracking.line_sight import LineSight
 
@@ -18,6 +19,15 @@ line should be that was not seen for longer is taken for that once it is surely 
 a stain that shows for a frame would else tell where the drone is, and how fast."""
 _PLAY_M = 0.1
 """A hovering drone sways by less."""
+
+
+class SeenLine(NamedTuple):
+    """A line in one frame: the axis across which it lies, its offset from the drone, m, and whether it is
+    surely one."""
+
+    axis: int
+    offset_m: float
+    sure: bool
 
 
 @dataclass(slots=True)
@@ -35,10 +45,33 @@ class HeldLine:
     """Its offset with play: by this lever lengths are held to scale.  By the offset itself, in which there is
     the noise that it followed, a filter would learn while it hovers that all lengths are longer: what it
     held and by what it errs then go together."""
+    sight_m: float
+    """Its offset as it was last seen, not filtered."""
     hits: int = 1
     feature: int | None = None
     surveyed: bool = False
     """Its distance from another line was held against the map."""
+
+    @classmethod
+    def first(cls, line_id: int, sight: LineSight, stamp_ns: int, offset_m: float) -> HeldLine:
+        """As it was seen for the first time, held at `offset_m`."""
+        return cls(
+            id=line_id,
+            axis=sight.axis,
+            width_m=sight.width_m,
+            seen_ns=stamp_ns,
+            from_m=sight.from_m,
+            to_m=sight.to_m,
+            lever_m=offset_m,
+            sight_m=sight.offset_m,
+            feature=sight.feature,
+        )
+
+    def take(self, sight: LineSight, stamp_ns: int) -> None:
+        """It was seen once more."""
+        self.seen_ns, self.hits, self.sight_m = stamp_ns, self.hits + 1, sight.offset_m
+        self.width_m += 0.2 * (sight.width_m - self.width_m)
+        self.from_m, self.to_m = sight.from_m, sight.to_m
 
     def lever_to(self, offset_m: float) -> None:
         """Have the lever follow the offset, but for its play."""

@@ -21,7 +21,7 @@ from flightd.tracking.attitude_history import AttitudeHistory
 from flightd.tracking.carried_heading import CarriedHeading
 from flightd.tracking.carried_motion import NO_LEAD, ExposureMotion, Lead
 from flightd.tracking.corrected_view import corrected_attitude, corrected_lens, corrected_mount
-from flightd.tracking.feature_trust import FeatureTrust
+from flightd.tracking.feature_trust import FeatureTrust, SeenFrame
 from flightd.tracking.floor_filter import FloorFilter
 from flightd.tracking.ground_junctions import floor_junctions
 from flightd.tracking.ground_squares import placed_squares
@@ -246,7 +246,8 @@ class LineTracker:
         for axis in self._filter.update(sights, rates, stamp_ns, believed, assumed=assumed, exact=exact):
             self._features_ns[axis] = stamp_ns
         places = {seen.id: (seen.across[0].offset_m, seen.across[1].offset_m) for seen in features}
-        self._trust.step(places, self._filter.speeds(stamp_ns), stamp_ns)
+        by_lines = self._filter.lines_seen(stamp_ns), self._filter.speeds(stamp_ns)
+        self._trust.step(SeenFrame(stamp_ns, height_m, places, *by_lines))
         self._seen_in = None if assumed else attitude
         yaw = attitude.yaw_rad + self._filter.mean(PSI)
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in placed_squares(lines.pads, view, yaw))

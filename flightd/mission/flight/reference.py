@@ -182,12 +182,14 @@ class ReferenceGenerator:
 
     def _may_brake(self, s: MissionInputs, task: ReferenceTask) -> bool:
         """Without a view of the floor, but with an attitude by which to dead-reckon from the last one; or,
-        the other way round, with a view to brake by while the vehicle is not heard."""
+        the other way round, with a view to brake by while the vehicle is not heard.  A take-off brakes by
+        what it sees alone."""
         p = self._params
         heard = s.telemetry_age_s <= p.telemetry_hold_s
         seen = s.sight_s <= p.lines_hold_s
-        known = (heard or seen) and s.pose is not None and not task.state.adopted
-        return known and not task.state.stopped and task.phase is not Phase.TAKE_OFF
+        rises = task.phase is Phase.TAKE_OFF
+        told = heard and seen and s.height_m >= p.expert.steer_above_m if rises else heard or seen
+        return told and s.pose is not None and not (task.state.adopted or task.state.stopped)
 
     def _wanted_height_m(self, s: MissionInputs, task: ReferenceTask) -> float:
         """Flying height; only a little more in search of lines that stay lost, in a take-off too."""

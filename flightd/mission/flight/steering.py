@@ -54,14 +54,21 @@ class Steering:
         motion = self._motion(pose, height_m, dt_s, stand_yaw_rad, lead)
         control, reference = self._control, guidance.reference.after(lead.after_s)
         sight_s, ease = min(inputs.x_age_s, inputs.y_age_s), self._plausibility.oscillation.ease
+        rises = guidance.phase is Phase.TAKE_OFF
         if guidance.guide is Guide.NONE:
             control.reset()
             return None
         if guidance.guide is Guide.LEVEL or pose is None:
             wanted, age_s = control.level(now_ns, motion, reference, dt_s, conditions.level_rad), 0.0
-        elif guidance.guide is Guide.BRAKE:
+        elif guidance.guide is Guide.BRAKE:  # in a take-off while least is known of push and lateness
             wanted = control.rest(
-                now_ns, motion, reference, dt_s, push, dead_reckoned=guidance.dead_reckoned, ease=ease
+                now_ns,
+                motion,
+                reference,
+                dt_s,
+                conditions.unleant_mps2 if rises else push,
+                dead_reckoned=guidance.dead_reckoned,
+                ease=min(ease, conditions.ease) if rises else ease,
             )
             age_s = min(inputs.telemetry_age_s, inputs.sight_s)
         else:
@@ -70,6 +77,7 @@ class Steering:
             # above the pad the mission steers on without lines: by the mat, or the motion last known
             by_mat = inputs.by_pad or (guidance.phase is Phase.LAND and sight_s < _TOUCHDOWN_S)
             age_s = inputs.telemetry_age_s if by_mat else max(sight_s, inputs.telemetry_age_s)
+        by_sight = guidance.guide is Guide.STEER or (rises and guidance.guide is Guide.BRAKE)
         # what reads nothing is as low as it was
         low = height_m < _LOW_M or (self._lands_low and math.isnan(height_m))
         self._lands_low = low and guidance.phase is Phase.LAND
@@ -83,7 +91,7 @@ class Steering:
             at_once=guidance.at_once,
             most_lean_rad=_LOW_LEAN_RAD if self._lands_low else math.inf,
             climb_error_mps=inputs.warnings.climb_error_mps,
-            haste=max(conditions.ease**2, _LEAST_HASTE) if guidance.guide is Guide.STEER else 1.0,
+            haste=max(conditions.ease**2, _LEAST_HASTE) if by_sight else 1.0,
         )
         return self._limiter.apply(wanted, around)
 

@@ -54,7 +54,7 @@ from tests.sim.ideal.ideal_ports import (
     IdealVehicle,
     IdealVision,
 )
-from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
+from tests.sim.ideal.ideal_sight import EyeErrors, EyeView, IdealEye
 
 STEP_NS = 5_000_000
 TICK_NS = 20_000_000
@@ -183,6 +183,8 @@ class IdealFlight:
         self.ground_silent_s = 0.0
         self.aisle_closed = True
         self.lamp: Lamp = NO_LAMP
+        self.detected_as: Callable[[LineSet, EyeView], LineSet] = lambda seen, _: seen
+        """What a detector makes of what is to be seen in a frame."""
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
         self._charge_pads = ChargePads(site, self.airframe, pads) if pads else None
@@ -332,6 +334,7 @@ class IdealFlight:
         faults = self.faults
         pose = self._shaken(self.airframe.kinematics(self._now_ns))
         seen = self._eye.see(pose, seq, self._now_ns + self._off_ns)
+        seen = self.detected_as(seen, self._eye.view(pose))
         seen = replace(seen, picture=PictureCheck(seq, 120.0, 40.0))
         if faults.bare:
             seen = replace(seen, lines=())
