@@ -23,9 +23,10 @@ _FEWEST = 3
 _LEAST_NS, _MOST_NS = 90_000_000, 500_000_000
 """Each frame is held against the newest one that is so old."""
 _MOST_FRAMES = 64
+"""Stamps may go back as the camera's delay is learnt: time alone bounds nothing."""
 _FADE = 0.98
 """Of what was seen before, with each frame in which the drone moved."""
-_ENOUGH_FRAMES, _ENOUGH = 4, 0.0008
+_ENOUGH_WAYS, _ENOUGH = 4, 0.0008
 """So many ways along an axis, and as much in all of squared ways, rad2."""
 _LEAST, _MOST = -0.4, 0.5
 """By how much of the way features may lag behind the line, or go further."""
@@ -62,7 +63,7 @@ class FeatureTrust:
     @property
     def holds(self) -> bool:
         """Whether features lately moved as the lines did; not before that was seen."""
-        if self._counted < _ENOUGH_FRAMES or self._squares < _ENOUGH:
+        if self._counted < _ENOUGH_WAYS or self._squares < _ENOUGH:
             return False
         moved = _LEAST_GONE < self._by_lines / self._squares < _MOST_GONE
         return moved and _LEAST < self._beyond / self._squares < _MOST

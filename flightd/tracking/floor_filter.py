@@ -25,7 +25,7 @@ from flightd.tracking.delay_leap import DelayLeap
 from flightd.tracking.first_doubt import LEAST_HEIGHT_SHARE, drift_of, first_sigmas
 from flightd.tracking.forgotten_lines import FEATURE_NS, forgotten_features, forgotten_lines
 from flightd.tracking.frame_measurement import FrameMeasurement, offset_error, placed
-from flightd.tracking.held_lines import SURE_HITS, HeldLine, SeenLine, associate, refound, unsurveyed
+from flightd.tracking.held_lines import HeldLine, SeenLine, associate, refound, unsurveyed
 from flightd.tracking.innovations import Innovations
 from flightd.tracking.kalman import corrected, predicted
 from flightd.tracking.line_sight import FeatureSight, LineSight, Rates
@@ -175,7 +175,7 @@ class FloorFilter:
 
     def tells(self, axis: int, lines: Sequence[int]) -> bool:
         """Whether one of these lines held is surely one, across the axis."""
-        return any(self.held[line].axis == axis and self.held[line].hits >= SURE_HITS for line in lines)
+        return any(self.held[line].axis == axis and self.held[line].is_sure for line in lines)
 
     def speeds(self, stamp_ns: int) -> tuple[float | None, float | None]:
         """Speed along each axis, None where no line seen in the frame of that time tells it."""
@@ -188,7 +188,7 @@ class FloorFilter:
     def lines_seen(self, stamp_ns: int) -> dict[int, SeenLine]:
         """The lines seen in the frame of that time, by their ids."""
         seen = (one for one in self.held if one.feature is None and one.seen_ns == stamp_ns)
-        return {one.id: SeenLine(one.axis, one.sight_m, one.hits >= SURE_HITS) for one in seen}
+        return {one.id: SeenLine(one.axis, one.sight_m, one.is_sure) for one in seen}
 
     def turn_to(self, offset_rad: float, sigma_rad: float) -> None:
         """The heading offset is another one, and all that it was correlated with is no longer."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from typing import Final
 
-from flightd.tracking.held_lines import SURE_HITS, HeldLine
+from flightd.tracking.held_lines import HeldLine
 
 _FEATURES: Final = 6
 """So many features are held across an axis, those seen last, since several detectors take turns."""
@@ -40,7 +40,7 @@ def forgotten_lines(
         if one.feature is not None:
             continue
         lines.append(line)
-        glimpsed = one.is_lost(stamp_ns) and one.hits < SURE_HITS
+        glimpsed = one.is_lost(stamp_ns) and not one.is_sure
         if glimpsed or (stamp_ns - one.seen_ns > forget_ns and not held_on(line)):
             old.add(line)
     lines.sort(key=lambda line: -held[line].seen_ns)

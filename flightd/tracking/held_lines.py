@@ -11,7 +11,7 @@ from flightd.tracking.line_sight import LineSight
 _GATE_SIGMAS = 4.0
 _LEAST_SHARE = 0.3
 """Of the gate: so near a line is taken for one held however sure both are."""
-SURE_HITS = 3
+_SURE_HITS = 3
 """A line seen so often is surely one."""
 _LOST_NS, _NEW_HITS = 250_000_000, 10
 """A line seen less often is forgotten so soon: what only shows now and then is none.  What is found where a
@@ -51,6 +51,11 @@ class HeldLine:
     feature: int | None = None
     surveyed: bool = False
     """Its distance from another line was held against the map."""
+
+    @property
+    def is_sure(self) -> bool:
+        """It is surely a line."""
+        return self.hits >= _SURE_HITS
 
     @classmethod
     def first(cls, line_id: int, sight: LineSight, stamp_ns: int, offset_m: float) -> HeldLine:
@@ -129,12 +134,12 @@ def refound(
     they are from each other, and the standard deviation of that."""
     pairs: list[tuple[int, int]] = []
     for new in seen:
-        if not SURE_HITS <= held[new].hits <= _NEW_HITS:
+        if not (held[new].is_sure and held[new].hits <= _NEW_HITS):
             continue
         best, least_m = None, gate_m
         for old, line in enumerate(held):
             lost = line.feature is None and line.axis == held[new].axis and line.is_lost(stamp_ns)
-            if not lost or line.hits < SURE_HITS or any(old == taken for _, taken in pairs):
+            if not lost or not line.is_sure or any(old == taken for _, taken in pairs):
                 continue
             apart_m, sigma_m = apart(new, old)
             if abs(apart_m) < min(least_m, reach_of(sigma_m, gate_m)):
@@ -151,9 +156,9 @@ def unsurveyed(
     that of the surest one to hold it against, by `sigma` of a line."""
     known = [(line, one) for line, one in enumerate(held) if one.axis == axis and one.id in ids]
     for line, one in known:
-        if one.surveyed or one.hits < SURE_HITS:
+        if one.surveyed or not one.is_sure:
             continue
         others = [at for at, other in known if other.surveyed]
-        others = others or [at for at, other in known if at != line and other.hits >= SURE_HITS]
+        others = others or [at for at, other in known if at != line and other.is_sure]
         if others:
             yield line, min(others, key=sigma)

@@ -72,15 +72,17 @@ def ending(overrun_m: float) -> Site:
     return parse_site(f"{aisle_a}overrun_m = {overrun_m}{rest.replace('size_m = 0.5', pad)}", "ending")
 
 
-@pytest.mark.parametrize(("seed", "overrun_m"), [(2, 0.25), (4, 0.5)])
-def test_a_pad_without_a_mat_is_found_by_the_end_of_its_line(seed: int, overrun_m: float) -> None:
+@pytest.mark.parametrize(("seed", "overrun_m", "within_m"), [(2, 0.25, 0.10), (4, 0.5, 0.12)])
+def test_a_pad_without_a_mat_is_found_by_the_end_of_its_line(
+    seed: int, overrun_m: float, within_m: float
+) -> None:
     """Wherever the line really ends, up to 0.15 m from the map, of which most is put right."""
     world, site = ending(overrun_m), ending(0.35)
     config = CONFIG.with_values(mission={"dwell_s": 0.2})
     flown = IdealFlight(site, config, visits=("A2",), seed=seed, world=world).fly(120)
     last, (x_m, y_m) = flown.truth[-1][1], world.pad_centre(world.home)
     assert (flown.phase, flown.visited) == (Phase.DONE, ["A2"])
-    assert math.hypot(last.x_m - x_m, last.y_m - y_m) <= 0.12
+    assert math.hypot(last.x_m - x_m, last.y_m - y_m) <= within_m
 
 
 def test_a_pad_by_a_line_end_needs_one_near_and_survives_its_file() -> None:

@@ -183,7 +183,7 @@ class IdealFlight:
         self.ground_silent_s = 0.0
         self.aisle_closed = True
         self.lamp: Lamp = NO_LAMP
-        self.detected_as: Callable[[LineSet, EyeView], LineSet] = lambda seen, _: seen
+        self.detected_as: Callable[[LineSet, EyeView], LineSet] | None = None
         """What a detector makes of what is to be seen in a frame."""
         self.commands: list[Command] = []
         """Orders that the next tick takes."""
@@ -334,7 +334,8 @@ class IdealFlight:
         faults = self.faults
         pose = self._shaken(self.airframe.kinematics(self._now_ns))
         seen = self._eye.see(pose, seq, self._now_ns + self._off_ns)
-        seen = self.detected_as(seen, self._eye.view(pose))
+        if self.detected_as is not None:
+            seen = self.detected_as(seen, self._eye.view(pose))
         seen = replace(seen, picture=PictureCheck(seq, 120.0, 40.0))
         if faults.bare:
             seen = replace(seen, lines=())
