@@ -19,6 +19,7 @@ from flightd.adapters.ground_link import protocol_text
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.parameter_rule import Rule
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for
+from flightd.config.battery import BatteryConfig
 from flightd.config.schema import Config
 from flightd.guide import pages
 from flightd.mission.safety import hazard_table
@@ -48,7 +49,7 @@ def _parameters(firmware: Firmware) -> str:
         ('pose_output = "none"', Job(pose_output="none")),
         ('pose_output = "odometry"', Job(pose_output="odometry")),
         ("landing_target", Job(pose_output="odometry", landing_target=True)),
-        ("battery.cells = 4", Job(cells=4)),
+        ("battery.cells = 4", Job(battery=BatteryConfig(cells=4))),
     ):
         rules += [(rule, key) for rule in rules_for(firmware, job) if not _is_in(rule, usual)]
     lines = ["| parameter | must be | `--fix` sets | only with | why |", "|---|---|---|---|---|"]

@@ -121,7 +121,7 @@ def build(
         config.vehicle,
         clock,
         config.control,
-        cells=config.battery.cells,
+        battery=config.battery,
         highest_m=site.ceiling_m - config.hazards.headroom_m,
         url=peers.vehicle,
         opener=opener,

@@ -97,7 +97,7 @@ async def _examined(config: Config, path: Path, rock_s: float, *, quick: bool) -
     site, clock = load_site(config.mission.site), LoopClock()
     pilot_of(config, site)
     interlock_of(config, site, clock)
-    connect_vehicle(config.vehicle, clock, config.control, cells=config.battery.cells)
+    connect_vehicle(config.vehicle, clock, config.control, battery=config.battery)
     detector = detector_of(config, site)()
     subject = Subject(
         config,

@@ -109,7 +109,7 @@ async def examine(subject: Subject) -> Diagnosis:
         checks += found
     else:
         pictures, front = await asyncio.gather(camera.watch(config.camera, subject.clock), watching_front)
-        autopilot = await vehicle.examine(config.vehicle, subject.clock, cells=config.battery.cells)
+        autopilot = await vehicle.examine(config.vehicle, config.battery, subject.clock)
     checks += check_ground(config.ground, subject.ground)
     checks += camera.judge_camera(config, pictures)
     if pictures.rate_hz:
@@ -149,7 +149,7 @@ async def measure_delay(
 
 async def fix_parameters(found: Diagnosis, config: Config, agreed: Sequence[str], clock: Clock) -> Diagnosis:
     """Write the better values of the parameters `agreed` on by name; the diagnosis with what is known now."""
-    autopilot = await vehicle.examine(config.vehicle, clock, agreed, config.battery.cells)
+    autopilot = await vehicle.examine(config.vehicle, config.battery, clock, agreed)
     anew = {"parameter", *(check.name for check in autopilot.checks)}
     rest = [check for check in found.checks if check.name not in anew]
     return Diagnosis([*rest, *autopilot.checks], autopilot.report, autopilot.fixed)

@@ -14,6 +14,7 @@ from flightd.adapters.vehicle.mavlink.examination import Examination, Examinatio
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.required_parameters import FIRMWARES, Job
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import too_slow
+from flightd.config.battery import BatteryConfig
 from flightd.config.schema import Config
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import UnavailableError
@@ -44,25 +45,26 @@ class Autopilot:
 
 
 async def examine(
-    config: VehicleConfig, clock: Clock, agreed: Collection[str] = (), cells: int | None = None
+    config: VehicleConfig, battery: BatteryConfig, clock: Clock, agreed: Collection[str] = ()
 ) -> Autopilot:
-    """Read and judge the parameters, after writing the better values of those `agreed` on by name; `cells`
-    are the battery's, None: not configured.
+    """Read and judge the parameters, after writing the better values of those `agreed` on by name.
 
     InputError for a wrong address or signing key."""
     signing = signing_of(config, clock)
-    job = Job.of(config, cells)
+    job = Job.of(config, battery)
     examination = Examination(config.url, clock, config.system_id, signing, job)
     try:
         async with examination.connected():
             report = await examination.report()
             wanted = [found for found in report.findings if found.name in agreed]
             if not wanted:
-                return Autopilot(tuple(judge(config, report, cells)), report)
+                return Autopilot(tuple(judge(config, report, battery.cells)), report)
             left = {found.name for found in await examination.fix(wanted)}
             fixed = tuple(found.name for found in wanted if found.name not in left)
             report = await examination.report()
-            return Autopilot((*judge(config, report, cells), *_after_fix(fixed, sorted(left))), report, fixed)
+            return Autopilot(
+                (*judge(config, report, battery.cells), *_after_fix(fixed, sorted(left))), report, fixed
+            )
     except UnavailableError as err:
         return Autopilot((error("vehicle", str(err), _CABLE + (_KEY if signing else "")),))
 

@@ -11,8 +11,9 @@ from flightd.adapters.vehicle.mavlink.ardupilot import ArduPilotVehicle
 from flightd.adapters.vehicle.mavlink.link.signing import Signing, read_key
 from flightd.adapters.vehicle.mavlink.pose_output import PoseForm
 from flightd.adapters.vehicle.mavlink.px4 import Px4Vehicle
-from flightd.adapters.vehicle.mavlink.required_parameters import Job
+from flightd.adapters.vehicle.mavlink.required_parameters import UNKNOWN_BATTERY, Job
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkOptions
+from flightd.config.battery import BatteryConfig
 from flightd.config.control import ControlConfig
 from flightd.config.vehicle import VehicleConfig
 from flightd.core.errors import InputError
@@ -26,7 +27,7 @@ def connect_vehicle(
     clock: Clock,
     limits: ControlConfig | None = None,
     *,
-    cells: int | None = None,
+    battery: BatteryConfig = UNKNOWN_BATTERY,
     highest_m: float = math.inf,
     url: str | None = None,
     opener: OpenDatagrams = open_datagrams,
@@ -35,33 +36,33 @@ def connect_vehicle(
     signing key that cannot be used.
 
     `limits` are those of the setpoints: an AR.Drone's own are set to them, for it takes shares of its own.
-    `cells` are the battery's in series, None: not known here; `highest_m` is the greatest height that may be
-    flown, for the one that keeps it itself.
+    `battery` is what is known of its own, by which its failsafes are judged; `highest_m` is the greatest
+    height that may be flown, for the one that keeps it itself.
     `url` is where the vehicle is reached, unless that is the configuration's; `opener` opens the
     sockets of a MAVLink one.
     """
     url = config.url if url is None else url
     match config.kind:
         case "ardupilot":
-            return ArduPilotVehicle(url, clock, _options(config, clock, opener, cells))
+            return ArduPilotVehicle(url, clock, _options(config, clock, opener, battery))
         case "px4":
-            return Px4Vehicle(url, clock, _options(config, clock, opener, cells))
+            return Px4Vehicle(url, clock, _options(config, clock, opener, battery))
         case "ardrone":
             return ArDroneVehicle(settings_of(url, limits, highest_m), clock)
         case "mavsdk":
-            return _mavsdk_vehicle(url, config, clock, opener, cells)
+            return _mavsdk_vehicle(url, config, clock, opener, battery)
     raise InputError(f"vehicle.kind {config.kind}: no such adapter")
 
 
 def _mavsdk_vehicle(
-    url: str, config: VehicleConfig, clock: Clock, opener: OpenDatagrams, cells: int | None
+    url: str, config: VehicleConfig, clock: Clock, opener: OpenDatagrams, battery: BatteryConfig
 ) -> Vehicle:
     """The library is an extra, and 19 MB that nobody else has to load."""
     try:
         from flightd.adapters.vehicle.mavsdk.vehicle import MavsdkVehicle  # noqa: PLC0415
     except ImportError as err:
         raise missing_extra("mavsdk", "vehicle.kind mavsdk") from err
-    return MavsdkVehicle(url, clock, config.system_id, opener, cells=cells)
+    return MavsdkVehicle(url, clock, config.system_id, opener, cells=battery.cells)
 
 
 def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:
@@ -71,10 +72,12 @@ def signing_of(config: VehicleConfig, clock: Clock) -> Signing | None:
     return Signing(read_key(config.signing_key), clock, time.time(), config.stamp_file)
 
 
-def _options(config: VehicleConfig, clock: Clock, opener: OpenDatagrams, cells: int | None) -> MavlinkOptions:
+def _options(
+    config: VehicleConfig, clock: Clock, opener: OpenDatagrams, battery: BatteryConfig
+) -> MavlinkOptions:
     return MavlinkOptions(
         system_id=config.system_id,
-        job=Job.of(config, cells),
+        job=Job.of(config, battery),
         signing=signing_of(config, clock),
         pose_form=_form(config),
         origin_deg=config.origin_deg,

@@ -118,7 +118,7 @@ def _set_up(config: Config) -> dict[str, float]:
     is_px4 = firmware is Firmware.PX4
     known: Mapping[str, float | int] = PX4_PARAMETERS if is_px4 else COPTER_PARAMETERS
     values = {**known, **shipped_parameters("px4" if is_px4 else "ardupilot", known)}
-    job = Job.of(config.vehicle, config.battery.cells)
+    job = Job.of(config.vehicle, config.battery)
     return {
         name: rule.better
         for rule in (*rules_for(firmware, job), *advice_for(firmware, job))

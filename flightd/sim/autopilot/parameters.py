@@ -37,7 +37,7 @@ COPTER_PARAMETERS: dict[str, float] = {
     "FS_EKF_ACTION": 1,
     "FS_EKF_THRESH": 0.8,
     "RC_OPTIONS": 32,
-    "BATT_LOW_VOLT": 10.5,
+    "BATT_LOW_VOLT": 9.9,
     "BATT_LOW_TIMER": 10,
     "BATT_FS_LOW_ACT": 1,
     "GUID_OPTIONS": 0,

@@ -19,6 +19,7 @@ from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
 from flightd.adapters.vehicle.mavlink.pose_sharing import pose_use
 from flightd.adapters.vehicle.mavlink.required_parameters import RULES, Job, advice_for, rules_for
 from flightd.adapters.vehicle.mavlink.services.heartbeat_rate import too_slow
+from flightd.config.battery import BatteryConfig
 from flightd.config.vehicle import PoseChoice
 from flightd.core.errors import UnavailableError
 from flightd.core.types import PoseUse
@@ -276,6 +277,12 @@ def test_what_is_shipped_is_what_a_fix_would_write_and_a_simulated_copter_has() 
     for name in ("GUID_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT"):
         assert shipped[name] == better[name] == COPTER_PARAMETERS[name]
     assert shipped["FS_GCS_TIMEOUT"] == 0.5
+    (low,) = (
+        rule
+        for rule in rules_for(Firmware.ARDUPILOT, Job(battery=BatteryConfig(cells=3)))
+        if rule.names == ("BATT_LOW_VOLT",)
+    )
+    assert shipped["BATT_LOW_VOLT"] == low.better == COPTER_PARAMETERS["BATT_LOW_VOLT"]
 
 
 def test_range_finders_and_cells_are_looked_at() -> None:

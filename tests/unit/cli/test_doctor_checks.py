@@ -12,12 +12,14 @@ import pytest
 
 from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
+from flightd.adapters.vehicle.mavlink.parameter_rule import Rule
 from flightd.adapters.vehicle.mavlink.parameter_rule import judge as judge_parameter
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for
 from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.app.build import pilot_of
 from flightd.app.computer_check import look_here
 from flightd.cli.planned_flight import planned_in_words
+from flightd.config.battery import BatteryConfig
 from flightd.config.camera import CameraConfig
 from flightd.config.recorder import RecorderConfig
 from flightd.config.schema import Config, load_config
@@ -260,13 +262,33 @@ def test_the_cells_of_the_battery(cells: int | None, told: int, level: CheckLeve
     assert check.level is level
 
 
-@pytest.mark.parametrize(("volts", "cells", "fits"), [(10.5, 3, True), (10.5, 4, False), (14.0, 4, True)])
+@pytest.mark.parametrize(("volts", "cells", "fits"), [(9.9, 3, True), (9.9, 4, False), (13.2, 4, True)])
 def test_a_low_voltage_for_three_cells_does_not_pass_on_four(volts: float, cells: int, fits: bool) -> None:
-    rules = [
-        rule for rule in rules_for(Firmware.ARDUPILOT, Job(cells=cells)) if "BATT_LOW_VOLT" in rule.names
-    ]
-    (rule,) = rules
+    rule = _low_volt(BatteryConfig(cells=cells))
     assert (judge_parameter(rule, ("BATT_LOW_VOLT", volts)) is None) is fits
+
+
+@pytest.mark.parametrize(
+    ("home_v", "land_v", "least", "most"),
+    [(3.45, 3.3, 9.6, 10.35), (3.1, 2.9, 8.4, 9.3), (3.6, 3.5, 10.2, 10.8)],
+)
+def test_the_autopilot_lands_by_its_voltage_after_the_way_home_and_not_before(
+    home_v: float, land_v: float, least: float, most: float
+) -> None:
+    rule = _low_volt(BatteryConfig(cells=3, cell_start_v=3.7, cell_home_v=home_v, cell_land_v=land_v))
+    assert rule.better is not None
+    assert rule.fits(rule.better)
+    for volts, fits in ((least - 0.01, False), (least, True), (most, True), (most + 0.01, False)):
+        assert rule.fits(volts) is fits
+
+
+def _low_volt(battery: BatteryConfig) -> Rule:
+    (rule,) = (
+        rule
+        for rule in rules_for(Firmware.ARDUPILOT, Job(battery=battery))
+        if rule.names == ("BATT_LOW_VOLT",)
+    )
+    return rule
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,14 @@ from dataclasses import dataclass, replace
 from flightd.adapters.vehicle.mavlink.link.connection import Firmware
 from flightd.adapters.vehicle.mavlink.parameter_rule import Rule, has_bits, one_of, within
 from flightd.adapters.vehicle.mavlink.pose_parameters import pose_rules
+from flightd.config.battery import BatteryConfig
 from flightd.config.vehicle import PoseChoice, VehicleConfig
 
 FIRMWARES = {"ardupilot": Firmware.ARDUPILOT, "px4": Firmware.PX4, "mavsdk": Firmware.PX4}
 """By `vehicle.kind`, of those that have parameters."""
+
+UNKNOWN_BATTERY = BatteryConfig()
+"""One whose cells nobody has counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,21 +33,20 @@ class Job:
     """What bit 3 of ArduCopter's GUID_OPTIONS must be; None: either."""
     pose_output: PoseChoice = "auto"
     landing_target: bool = False
-    cells: int | None = None
-    """In series in the battery; None: not known here."""
+    battery: BatteryConfig = UNKNOWN_BATTERY
     range_finder: int | None = None
     """Id of the range finder to fly by, which ArduPilot counts from 0; None: the first."""
 
     @classmethod
-    def of(cls, config: VehicleConfig, cells: int | None) -> Job:
-        """What is configured, `cells` of the battery (None: not)."""
+    def of(cls, config: VehicleConfig, battery: BatteryConfig) -> Job:
+        """What is configured of the vehicle and its battery."""
         return cls(
             own_system_id=config.own_system_id,
             guided=config.flying_mode == "guided",
             raw_thrust=config.raw_thrust,
             pose_output=config.pose_output if config.shares_pose else "none",
             landing_target=config.landing_target,
-            cells=cells,
+            battery=battery,
             range_finder=config.range_finder,
         )
 
@@ -191,7 +194,8 @@ _PX4: tuple[Rule, ...] = (
     Rule(("MPC_THR_HOVER",), within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
 )
 
-_LOW_CELL_V = (3.2, 3.7)
+_LAST_RESORT_V = 0.1
+"""So far below `cell_land_v` a cell has enough left to come down by."""
 _GUID_OPTIONS = "the thrust of our setpoints would be taken for something else (vehicle.raw_thrust)"
 
 _ARDUPILOT_GUIDED = (
@@ -219,14 +223,16 @@ def _guid_options(raw: bool) -> Rule:
     )
 
 
-def _low_volt(cells: int) -> Rule:
-    least, most = round(_LOW_CELL_V[0] * cells, 2), round(_LOW_CELL_V[1] * cells, 2)
+def _low_volt(battery: BatteryConfig, cells: int) -> Rule:
+    """The autopilot's landing is the last resort: after our way home, not before it."""
+    least = round((battery.cell_land_v - _LAST_RESORT_V) * cells, 2)
+    most, better = round(battery.cell_home_v * cells, 2), round(battery.cell_land_v * cells, 2)
     return Rule(
         ("BATT_LOW_VOLT",),
         within(least, most),
-        f"{least:g} to {most:g} V for {cells} cells (battery.cells)",
-        "a threshold for fewer cells is never reached in time, one for more lands at once",
-        round(3.5 * cells, 2),
+        f"{least:g} to {most:g} V for {cells} cells (battery.cells, cell_home_v, cell_land_v)",
+        "above, the autopilot lands in the aisle what could still fly home; below, it acts too late",
+        better,
     )
 
 
@@ -268,18 +274,19 @@ RULES: dict[Firmware, tuple[Rule, ...]] = {Firmware.ARDUPILOT: _ARDUPILOT, Firmw
 def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     """The firmware's table, with the rules that the job adds or makes stricter in their places."""
     extra: tuple[Rule, ...] = ()
+    cells = job.battery.cells
     if firmware is Firmware.ARDUPILOT:
         extra += (_supervised(job.own_system_id), _alone(job.own_system_id))
-        if job.cells is not None:
-            extra += (_low_volt(job.cells),)
+        if cells is not None:
+            extra += (_low_volt(job.battery, cells),)
         if job.guided:
             extra += _ARDUPILOT_GUIDED
         if job.raw_thrust is not None:
             extra += (_guid_options(job.raw_thrust),)
         if job.landing_target:
             extra += _ARDUPILOT_LANDING
-    elif job.cells is not None:
-        extra += (_cells_of(job.cells),)
+    elif cells is not None:
+        extra += (_cells_of(cells),)
     extra += pose_rules(firmware, job.pose_output, landing_target=job.landing_target)
     stricter = {rule.names: rule for rule in extra if not rule.advised}
     other = job.range_finder if firmware is Firmware.ARDUPILOT else None

@@ -41,6 +41,7 @@ from flightd.adapters.vehicle.mavsdk.connection import MavsdkConnection
 from flightd.adapters.vehicle.mavsdk.gate import SetpointGate
 from flightd.adapters.vehicle.mavsdk.library import Library, Plugins, whole_fields, whole_list
 from flightd.adapters.vehicle.mavsdk.telemetry import MavsdkTelemetry
+from flightd.config.battery import BatteryConfig
 from flightd.core.refusal import Refusal
 from flightd.core.types import (
     Attitude,
@@ -122,7 +123,7 @@ class MavsdkVehicle:
         self._text_waits = asyncio.Event()
         self._sent_ns = 0
         self._unfit: Refusal | None = None
-        self._rules = rules_for(Firmware.PX4, Job(cells=cells))
+        self._rules = rules_for(Firmware.PX4, Job(battery=BatteryConfig(cells=cells)))
         self._way_down = way_down_rules(self._rules)
         self._examined = False
         self._parameters: dict[str, tuple[str, float]] = {}
