@@ -377,6 +377,7 @@ class Places:
         reach_m = np.clip(_DOUBT_SIGMAS * self.sigma_m, _LEAST_M, _SAME_M)
         near = np.abs(self.at_m[:, None, :] - self.at_m[None, :, :]) < reach_m[:, None, :]
         close: Flags = near[:, :, 0] & near[:, :, 1]
+        close |= close.T  # by whichever is known worse: else an unlikely one would swallow a likelier
         if np.count_nonzero(close) > len(self):
             close &= self._alike()
         if np.count_nonzero(close) > len(self):

@@ -70,13 +70,18 @@ class PadFinder:
         if tracks.pads_ns == self._taken_ns:
             return
         self._taken_ns = tracks.pads_ns
+        held = []
         for sight in tracks.pads:
             x_m, y_m = pose.x_m + sight.x_m, pose.y_m + sight.y_m
             pad = self._pad_at(x_m, y_m, sight.side_m)
             if pad is not None:
                 at = self._site.pad_centre(pad)
-                self._hold(at[0] - sight.x_m, at[1] - sight.y_m, tracks.pads_ns)
+                off_m = math.hypot(x_m - at[0], y_m - at[1])
+                held.append((off_m, at[0] - sight.x_m, at[1] - sight.y_m))
                 self._found.setdefault(pad.node, _Found()).add(x_m, y_m)
+        if held:  # of several in a frame the nearest to the map's
+            _, at_x, at_y = min(held)
+            self._hold(at_x, at_y, tracks.pads_ns)
 
     def _take_ends(self, tracks: TrackSet, pose: GridPose) -> None:
         """The places of pads by the line ends that are seen where the map has theirs.  Of several in a frame

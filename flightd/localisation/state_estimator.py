@@ -124,7 +124,7 @@ class StateEstimator:
         self.localiser = GridLocaliser(self._site, node, view, self._config.localisation)
         self.poses = PoseHistory(self._least_integrity)
         self.pads = PadFinder(self._site)
-        self._stuck = StuckHeight()
+        self._stuck, self._height_ns = StuckHeight(), 0
         self.climb = ClimbDoubt()
         self._climbed = HeightHistory()
         self._climbed_m, self._climb_ns, self._climb_mps = 0.0, 0, math.nan
@@ -334,9 +334,12 @@ class StateEstimator:
 
     def _mind_height(self, now_ns: int, vehicle: VehicleState, commanded: AttitudeSetpoint | None) -> None:
         """Forget the heights of a range finder that is found to be stuck: then the lines' width tells.  Once
-        it is the climb that is wrong it says nothing against the height any more."""
+        it is the climb that is wrong it says nothing against the height any more.  One that is silent is not
+        stuck: its last height is judged once."""
+        is_new, self._height_ns = vehicle.height_stamp_ns > self._height_ns, vehicle.height_stamp_ns
         if not self.armed or commanded is None or self._stuck.found or self.climb.found:
             return
-        if self._stuck.step(now_ns, vehicle.height_m, vehicle.climb_mps, commanded.climb_mps):
+        height_m = vehicle.height_m if is_new else math.nan
+        if self._stuck.step(now_ns, height_m, vehicle.climb_mps, commanded.climb_mps):
             self._heights = HeightHistory()
             self._carried.forget()

@@ -105,7 +105,7 @@ class FloorFilter:
         self._drift = drift_of(priors)
         self.height_known_to(0.0)
         self._steady, self._unseen_s, self._followed_ns = [0.0, 0.0], [0.0, 0.0], [0, 0]
-        self._refused: set[int | None] = set()
+        self._refused: dict[int | None, int] = {}  # features that were none, and when they were told last
         self._innovations = Innovations(priors.shake_rad, priors.shake_bounds_rad)
         self.delay_leap = DelayLeap()
 
@@ -254,6 +254,7 @@ class FloorFilter:
         new ones.  Of an attitude that is only `assumed` nothing is learnt for good; of lines whose tilt was
         not compensated in an `exact` form nothing but the delay.  Across which axes
         features told the motion where no line did."""
+        self._mind_refused(features, stamp_ns)
         self._drop(forgotten_features(self.held, self._refused, stamp_ns))
         before = self._x[:FIRST_LINE].copy()
         for line, held in enumerate(self.held):  # it was dead-reckoned on, if it was not seen
@@ -266,7 +267,8 @@ class FloorFilter:
             stamp_ns,
         )
         bare = [axis for axis in range(2) if not self.tells(axis, [line for _, line in known])]
-        followed, strange = self._followed([seen.across[axis] for axis in bare for seen in features], rates)
+        of_bare = [seen.across[axis] for axis in bare for seen in features]
+        followed, strange = self._followed(of_bare, rates, stamp_ns)
         told = FrameMeasurement()
         for sight, line in known:
             told.add_offset(sight, line, self.held[line].lever_m, self._x, rates)
@@ -377,13 +379,18 @@ class FloorFilter:
             return _LASTING if assumed else None
         return _SENSORS if assumed else _TILTS
 
+    def _mind_refused(self, features: Sequence[FeatureSight], stamp_ns: int) -> None:
+        """Forget those that are told no more; where several detectors take turns, each tells its own."""
+        told = {sight.feature for seen in features for sight in seen.across}
+        self._refused |= dict.fromkeys(self._refused.keys() & told, stamp_ns)
+        self._refused = {one: ns for one, ns in self._refused.items() if stamp_ns - ns <= FEATURE_NS}
+
     def _followed(
-        self, sights: Sequence[LineSight], rates: Rates
+        self, sights: Sequence[LineSight], rates: Rates, stamp_ns: int
     ) -> tuple[list[tuple[LineSight, int]], list[LineSight]]:
         """The features that are held across their axis, and those that are not.  One that is not where it
         should be was no point of the floor: it is refused for as long as it is told."""
         places = {(held.feature, held.axis): line for line, held in enumerate(self.held)}
-        self._refused &= {sight.feature for sight in sights}
         known: list[tuple[LineSight, int]] = []
         strange: list[LineSight] = []
         for sight in sights:
@@ -397,7 +404,7 @@ class FloorFilter:
             if abs(apart_m) < _FEATURE_SIGMAS * sigma_m:
                 known.append((sight, line))
             else:
-                self._refused.add(sight.feature)
+                self._refused[sight.feature] = stamp_ns
         return known, strange
 
     def _take(

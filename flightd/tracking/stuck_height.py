@@ -48,7 +48,8 @@ class StuckHeight:
         self._wanted_m = 0.0
 
     def step(self, now_ns: int, height_m: float, climb_mps: float, wanted_mps: float) -> bool:
-        """Take the newest height (m), climb rate and commanded climb rate (m/s, + up; NaN: not known)."""
+        """Take a height (m; NaN: none since the last call), climb rate and commanded climb rate (m/s, + up;
+        NaN: not known)."""
         dt_s = 0.0 if self._last_ns is None else (now_ns - self._last_ns) * 1e-9
         self._last_ns = now_ns
         self._climbed_m += 0.0 if math.isnan(climb_mps) else climb_mps * dt_s

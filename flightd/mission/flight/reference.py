@@ -271,6 +271,8 @@ class ReferenceGenerator:
             self._y.brake(s.dt_s)
         if to_goal or task.view is not None or phase is Phase.TURN:
             self._yaw.step(self._yaw.position + wrap_pi(yaw - self._yaw.position), s.dt_s)
+        else:  # a turn that is broken off comes to rest
+            self._yaw.brake(s.dt_s)
         return True
 
     def _height_goal_m(self, task: ReferenceTask) -> float:

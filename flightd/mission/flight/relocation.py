@@ -127,6 +127,7 @@ class Relocator:
         if s.pose is None:  # a new flight begins on its pad, wherever the last one was believed to end
             self._last = None
             self._doubted, self._sought_s = None, 0.0
+            self._moved, self._shift = False, (0.0, 0.0)
             return
         at = s.pose.x_m, s.pose.y_m
         if self._last is not None:
@@ -137,5 +138,5 @@ class Relocator:
                 if self._doubted is not None:
                     self._doubted = self._doubted[0] + dx, self._doubted[1] + dy
                 self._shift = (self._shift[0] + dx, self._shift[1] + dy)
-                self._moved = s.height_m > self._params.expert.steer_above_m
+                self._moved |= not s.height_m <= self._params.expert.steer_above_m  # or at a height unknown
         self._last = at

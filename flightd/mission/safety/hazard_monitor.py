@@ -69,6 +69,8 @@ class Counted:
         self._risen_ns: int | None = None
 
     def step(self, count: int, now_ns: int) -> bool:
+        if count < self._count:  # counted anew, by what came in its place
+            self._risen_ns, self._base = None, 0
         if count > self._count:
             self._risen_ns = now_ns
         elif self._risen_ns is not None and (now_ns - self._risen_ns) * 1e-9 > _NEWS_S:
@@ -84,7 +86,7 @@ class HazardMonitor:
         self._params = config.mission
         self._hazards = config.hazards
         self._debounce: defaultdict[Trigger, DebounceTimer] = defaultdict(DebounceTimer)
-        self._trouble = DebounceTimer()
+        self._trouble, self._worse = DebounceTimer(), DebounceTimer()
         self._detectors, self._writers, self._stamps = Counted(), Counted(), Counted(_JUMPED)
         self._leaps = Counted()
         self._seen = DebounceTimer()
@@ -107,8 +109,9 @@ class HazardMonitor:
             if self._debounce[trigger].step(holds, s.now_ns) >= tolerated_s and holds:
                 found.add(trigger)
         holding = found & _HOLDING_BUT_LINES
-        lasts_s = _SWINGS_LAND_S if holding == {Trigger.SWINGS} else self._params.lines_land_s
-        if self._trouble.step(bool(holding), s.now_ns) > lasts_s:
+        held_s = self._trouble.step(bool(holding), s.now_ns)
+        worse_s = self._worse.step(bool(holding - {Trigger.SWINGS}), s.now_ns)
+        if held_s > _SWINGS_LAND_S or worse_s > self._params.lines_land_s:
             found.add(Trigger.HAZARD_LASTS)
         return found - {Trigger.LINES_FOUND} if holding else found
 

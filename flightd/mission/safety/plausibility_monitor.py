@@ -49,8 +49,9 @@ class PlausibilityMonitor:
         """The mean push of the last seconds in which lines were seen, map axes."""
 
     def begin(self) -> None:
-        """Another flight: how its loop behaves is to be found out anew."""
+        """Another flight: how its loop behaves, and the air, is to be found out anew."""
         self.oscillation = OscillationMonitor()
+        self.push_mps2 = (0.0, 0.0)
 
     def step(
         self,
