@@ -111,3 +111,15 @@ def test_a_line_is_approached_once_what_lies_beside_it_has_come_into_view() -> N
     assert (approached.has(0), approached.has(1)) == (False, True)
     approached.step([seen(0, 0.85)], 0.4)
     assert (approached.has(0), approached.has(1)) == (True, False)
+
+
+def test_a_place_that_is_hardly_known_is_joined_to_a_likelier_one_and_not_the_other_way() -> None:
+    known = Places(PAINT, SensorModel(), 1e-5)
+    known.add([(3.0, 0.0)], [0.95], 0.02)
+    known.best = 1
+    known.add([(3.5, 0.0)], [0.04], 0.16)
+    known.at_m[2] = (3.12, 0.0)
+    known.thin(48)
+    assert len(known) == 2, "elsewhere and here"
+    assert known.at_m[known.best] == pytest.approx((3.0, 0.0))
+    assert known.sigma_m[known.best] == pytest.approx((0.02, 0.02))

@@ -103,3 +103,27 @@ def test_of_a_drone_that_was_found_flying_nothing_is_known() -> None:
 def test_what_levels_itself_by_how_it_stands_says_nothing() -> None:
     drone = Standing(hovers_unsteered=True)
     assert drone.told(3.0, LandedState.ON_GROUND, armed=True) == NOTHING
+
+
+def found_stuck(heard_every: int, *, sticks: bool = False) -> bool:
+    """Whether a range finder counts as stuck that is heard each so many ticks of a climb, where the vehicle
+    repeats its last height meanwhile."""
+    drone = Standing()
+    drone.told(1.0, LandedState.ON_GROUND, armed=True)
+    commanded = AttitudeSetpoint(drone.now_ns, 0.0, 0.0, 0.0, 0.8)
+    height_m, heard_ns = 0.1, drone.now_ns
+    for tick in range(100):
+        drone.now_ns += TICK_NS
+        if tick % heard_every == 0:
+            height_m, heard_ns = height_m if sticks else 0.1 + 0.8 * tick * 0.02, drone.now_ns
+        now_ns, attitude = drone.now_ns, Attitude(drone.now_ns, 0.0, 0.0, 0.0)
+        vehicle = VehicleState(
+            attitude, height_m, heard_ns, 0.8, "GUIDED", True, True, LandedState.IN_AIR, 0.8, 12.0, now_ns
+        )
+        drone.estimator.take(TickInput(now_ns, vehicle=vehicle, attitudes=(attitude,)), commanded)
+    return drone.estimator.height_stuck
+
+
+def test_a_range_finder_that_is_silent_for_half_a_second_of_a_climb_is_not_stuck() -> None:
+    assert not found_stuck(heard_every=30)
+    assert found_stuck(heard_every=5, sticks=True)

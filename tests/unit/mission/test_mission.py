@@ -442,3 +442,18 @@ def test_a_pause_in_a_hold_that_a_hazard_began_is_told() -> None:
     flight.order(CommandKind.RESUME)
     flight.run(0.02, follow=False)
     assert flight.mission.reason == "camera frozen"
+
+
+def test_a_turn_that_is_broken_off_comes_to_rest() -> None:
+    flight = Flight()
+    turns = (Phase.TURN, Phase.FOLLOW)
+    flight.run(120.0, lambda: flight.phase in turns and abs(yaw_rate_of(flight)) > 0.3)
+    assert abs(yaw_rate_of(flight)) > 0.3
+    flight.order(CommandKind.PAUSE)
+    flight.run(2.0)
+    assert flight.phase is Phase.HOLD
+    assert yaw_rate_of(flight) == pytest.approx(0.0, abs=1e-3)
+
+
+def yaw_rate_of(flight: Flight) -> float:
+    return 0.0 if flight.guidance is None else flight.guidance.reference.yaw_rate_radps

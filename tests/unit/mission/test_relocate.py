@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -141,3 +142,17 @@ def test_a_way_that_was_reckoned_wrongly_or_out_of_sight_is_not_flown_back() -> 
         later = replace(s, now_ns=s.now_ns + 5_000_000_000)
         relocator.next_look(s, anchor)
         assert (relocator.next_look(later, anchor) != anchor) is (spoilt == "not"), spoilt
+
+
+@pytest.mark.parametrize("height_m", [1.5, math.nan], ids=["at a height", "at one not known"])
+def test_a_position_that_jumps_is_doubted_and_forgotten_with_its_flight(height_m: float) -> None:
+    relocator, flight = Relocator(configured().mission, 5.5, ()), Flight()
+    flight.to(Phase.FOLLOW)
+    inputs = replace(flight.inputs, height_m=height_m)
+    assert inputs.pose is not None
+    assert not relocator.step(inputs, Phase.FOLLOW, 1.0)
+    jumped = replace(inputs, pose=replace(inputs.pose, x_m=inputs.pose.x_m + 1.5))
+    assert relocator.step(jumped, Phase.FOLLOW, 1.0) == {Trigger.POSITION_DOUBTED}
+    assert not relocator.step(replace(inputs, pose=None), Phase.PREFLIGHT, 1.0)
+    assert not relocator.step(inputs, Phase.ACQUIRE, 1.0)
+    assert relocator.shift_m == 0.0

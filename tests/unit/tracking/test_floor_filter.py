@@ -353,3 +353,16 @@ def test_a_line_found_too_far_away_is_another_one() -> None:
         floor.predict(FRAME_NS * 1e-9, 0.0, 0.0, 0.0)
         floor.update([sight(0.1 + 0.5)], STILL, at * FRAME_NS)
     assert sorted(round(floor.offset(n)[0], 1) for n in range(len(floor.held))) == [0.1, 0.6]
+
+
+def test_a_feature_is_refused_through_the_frames_of_another_detector() -> None:
+    floor = floor_filter(MotionNoise())
+    for step in range(60):
+        if step:
+            floor.predict(1 / 30, 0.0, 0.0, 0.0)
+        own = 10 * (step % 2)
+        jump_m = 0.3 if step >= 20 else 0.0
+        places = [(1, 0.2, 0.1), (2, 0.1 + jump_m * (own == 0), -0.2), (3, -0.2, 0.3)]
+        floor.update([], STILL, step * FRAME_NS, [feature(own + n, x, y) for n, x, y in places])
+        if step > 20:
+            assert 2 not in {held.feature for held in floor.held}

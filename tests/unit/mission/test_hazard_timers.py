@@ -1,4 +1,4 @@
-"""What swings about its place, and does nothing worse, is held longer than by any other hazard."""
+"""For how long hazards that hold are waited out, and what counts as one anew."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 from flightd.core.types import Phase
 from flightd.mission.guidance import ALL_WELL
 from flightd.mission.machine import Intent, State
+from flightd.mission.safety.hazard_monitor import Counted
 from tests.unit.mission.driven import Flight
 from tests.unit.mission.states import fresh
 
@@ -26,3 +27,19 @@ def test_swings_alone_are_waited_out_for_twelve_seconds() -> None:
 
 def test_swings_with_anything_else_end_as_soon_as_that() -> None:
     assert held_with(1.5, swings=True, frozen_s=9.0).phase is Phase.LAND
+
+
+def test_what_comes_after_long_swings_is_given_its_own_time() -> None:
+    flight = held_with(8.0, swings=True)
+    flight.set(warnings=replace(ALL_WELL, swings=True, frozen_s=9.0))
+    flight.run(0.5, follow=False)
+    assert flight.phase is Phase.HOLD
+    flight.run(1.0, follow=False)
+    assert (flight.phase, flight.mission.reason) == (Phase.LAND, "held for too long")
+
+
+def test_what_is_counted_anew_is_news_from_the_first() -> None:
+    """A delay that leapt in the flight before, and leaps in this one."""
+    counted = Counted()
+    told = [counted.step(count, second * 1_000_000_000) for second, count in enumerate((0, 1, 1, 1, 0, 0, 1))]
+    assert told == [False, True, True, False, False, False, True]
