@@ -17,12 +17,13 @@ _GAP_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What the limits have to know.  `headroom_m` is the way up to the ceiling (NaN: unknown, inf: none
+    """What the limits have to know. `headroom_m` is the way up to the ceiling (NaN: unknown, inf: none
     above), `back` the unit vector (forward, right) into the corridor that was left, None inside it;
-    `data_age_s` the age of the oldest thing that the lean was computed from, for a brake that of the newest:
-    pictures or attitude, either tells enough to come to rest by.  `at_once`: an emergency stop is not kept
-    waiting by the rates.  `climb_error_mps`: the vehicle takes its climb for so much more than it is.
-    `most_lean_rad`: the lean as a whole is no greater, whatever each axis is allowed.  `haste`: the share of
+    `data_age_s` the age of what the lean was computed from: the older of attitude and sight, of the grid's
+    two axes the one seen last (the other is dead-reckoned, and doubted by its sigma), for a brake the newer
+    of the two: pictures or attitude, either tells enough to come to rest by. `at_once`: an emergency stop is
+    not kept waiting by the rates. `climb_error_mps`: the vehicle takes its climb for so much more than it is.
+    `most_lean_rad`: the lean as a whole is no greater, whatever each axis is allowed. `haste`: the share of
     the configured tilt rate and jerk that it may change by, unless it comes to level by stale data or back
     into the corridor."""
 
@@ -101,12 +102,6 @@ class Limiter:
             math.atan(math.tan(last.roll_rad) + part * (math.tan(roll) - math.tan(last.roll_rad))),
             math.atan(math.tan(last.pitch_rad) + part * (math.tan(pitch) - math.tan(last.pitch_rad))),
         )
-
-
-def outward(setpoint: AttitudeSetpoint, back: tuple[float, float]) -> float:
-    """Acceleration of a setpoint away from where `back` points, m/s^2; negative when it leans back."""
-    forward, right = -math.tan(setpoint.pitch_rad), math.tan(setpoint.roll_rad)
-    return -GRAVITY_MPS2 * (forward * back[0] + right * back[1])
 
 
 def _inwards(roll: float, pitch: float, back: tuple[float, float]) -> tuple[float, float]:

@@ -447,7 +447,7 @@ LOOKING = frozenset({Phase.FOLLOW, Phase.HOVER, Phase.TURN, Phase.CLIMB, Phase.S
 class Status:
     """A `core.snapshot.Snapshot` as the flight log keeps it.
 
-    `latency_ms` are the newest frame's stages: capture, transport, detection, track (each from its
+    `latency_ms` are the newest frame's stages: capture, transport, detection, track, wire (each from its
     predecessor), and total (mid-exposure to setpoint on the wire).  `height_goal_m` is the commanded height
     above the floor, None in logs that do not tell it; `sensors` what the lines say of the drone's own sensors
     (`core.tracks.SensorEstimate`); `view_x_m`, `view_y_m` the place on the map from which a shelf is looked

@@ -358,8 +358,8 @@ class LineTracker:
         return ax - as_told[0] + push[0], ay - as_told[1] + push[1]
 
     def _carried_to(self, now_ns: int) -> tuple[float, float, float, float, float, float]:
-        """The same from the newest frame on; a longer blindness than is remembered is not bridged by
-        prediction."""
+        """Velocity, way and acceleration as `_carried` has them from the newest frame on; a longer blindness
+        than is remembered is not bridged by prediction."""
         if self._stands:
             return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         since_ns = max(self._stamp_ns, now_ns - self._forget_ns)

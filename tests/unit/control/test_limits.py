@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightd.config.control import ControlConfig, ControlExpert
-from flightd.control.limits import Limiter, Surroundings, outward
+from flightd.control.limits import Limiter, Surroundings
 from flightd.core.geometry import GRAVITY_MPS2
 from flightd.core.types import AttitudeSetpoint
 
@@ -135,3 +135,9 @@ def test_a_climb_that_the_vehicle_takes_for_another_is_commanded_otherwise(
     around = Surroundings(headroom_m=headroom_m, climb_error_mps=error_mps)
     limited = Limiter(LIMITS).apply(AttitudeSetpoint(1, climb_mps=wanted_mps), around)
     assert limited.climb_mps == pytest.approx(commanded_mps)
+
+
+def outward(setpoint: AttitudeSetpoint, back: tuple[float, float]) -> float:
+    """Acceleration of a setpoint away from where `back` points, m/s^2; negative when it leans back."""
+    forward, right = -math.tan(setpoint.pitch_rad), math.tan(setpoint.roll_rad)
+    return -GRAVITY_MPS2 * (forward * back[0] + right * back[1])
