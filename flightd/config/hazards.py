@@ -57,7 +57,10 @@ class HazardConfig(Section):
     disagree_s: float = Field(0.4, gt=0, le=10, description="height or heading disagree for so long")
     headroom_m: float = Field(0.5, ge=0.1, le=5, description="kept below the site's ceiling")
     corridor_m: float = Field(
-        0.45, ge=0.3, le=5, description="free way to both sides of every painted line of the map"
+        0.45,
+        ge=0.3,
+        le=5,
+        description="free way to both sides of every painted line of the map; less beside a shelf",
     )
     clock_error_s: float = Field(
         0.02,

@@ -3,33 +3,38 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from flightd.site.site import Site
+from flightd.site.site import Node, Shelf, Site
 from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut
 
 _BACK_MPS = 0.3
 """Who comes back faster than this may brake."""
 NEAR_KEEP_OUT_M = KEEP_OUT_CLEARANCE_M / 2
 """Nearer to a keep-out than this the free way is left: half of what every open line keeps from it."""
+_BESIDE_SHELF_M, _LEAST_M = 0.35, 0.2
+"""The free way ends so far before a shelf, for a drone has a width, but is no narrower than this."""
 
 
 @dataclass(frozen=True, slots=True)
 class Nearest:
-    """The nearest point of the grid and the distance to it, metres on the map."""
+    """The nearest point of the grid, or of an area, the distance to it, and how far the way there is free to
+    both sides, metres on the map."""
 
     x_m: float
     y_m: float
     distance_m: float
+    free_m: float = 0.0
 
 
 class Corridor:
-    """All points off the keep-outs within `half_width_m` of an edge of the grid that none of them closes."""
+    """All points off the keep-outs within `half_width_m` of an edge of the grid that none of them closes;
+    less where a shelf stands nearer, as the racks' ends do beside a cross way."""
 
     def __init__(self, site: Site, half_width_m: float) -> None:
-        self.half_width_m = half_width_m
         self._keep_outs = site.keep_outs
         self._low_keep_outs = site.low_keep_outs
         ends = [(site.nodes[edge.a], site.nodes[edge.b]) for edge in site.edges]
@@ -39,13 +44,15 @@ class Corridor:
             if not any(area.touches(a.x_m, a.y_m, b.x_m, b.y_m) for area in site.keep_outs)
         ]
         ends = open_ends or ends
+        self._free_m = np.array([_free_m(site.shelves, a, b, half_width_m) for a, b in ends])
         self._a = np.array([(a.x_m, a.y_m) for a, _ in ends]).reshape(-1, 2)
         self._along = np.array([(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in ends]).reshape(-1, 2)
         self._square = np.maximum(np.einsum("ij,ij->i", self._along, self._along), 1e-12)
         self._last: tuple[tuple[float, float], Nearest] | None = None
 
     def nearest(self, x_m: float, y_m: float) -> Nearest:
-        """Distance infinite on a site without edges.  Each tick asks for one point several times."""
+        """The point on the grid whose free way is the nearest; distance infinite on a site without edges.
+        Each tick asks for one point several times."""
         if self._last is None or self._last[0] != (x_m, y_m):
             self._last = (x_m, y_m), self._nearest(x_m, y_m)
         return self._last[1]
@@ -58,8 +65,9 @@ class Corridor:
         np.maximum(np.minimum(share, 1.0, out=share), 0.0, out=share)  # np.clip takes five times as long
         points = self._a + share[:, None] * self._along
         distances = np.hypot(points[:, 0] - x_m, points[:, 1] - y_m)
-        best = int(distances.argmin())
-        return Nearest(float(points[best, 0]), float(points[best, 1]), float(distances[best]))
+        best = int((distances - self._free_m).argmin())
+        at_x, at_y = points[best].tolist()
+        return Nearest(at_x, at_y, float(distances[best]), float(self._free_m[best]))
 
     def nearest_keep_out(self, x_m: float, y_m: float) -> Nearest:
         """The nearest point of a keep-out's edge; the distance is negative within it, and infinite on a site
@@ -69,7 +77,8 @@ class Corridor:
 
     def outside_m(self, x_m: float, y_m: float) -> float:
         """How far outside the free way a point is; 0 within it."""
-        beside_m = self.nearest(x_m, y_m).distance_m - self.half_width_m
+        near = self.nearest(x_m, y_m)
+        beside_m = near.distance_m - near.free_m
         return max(beside_m, NEAR_KEEP_OUT_M - self.nearest_keep_out(x_m, y_m).distance_m, 0.0)
 
     def back(
@@ -86,11 +95,23 @@ class Corridor:
                 area = beside
         if area.distance_m < KEEP_OUT_CLEARANCE_M and abs(area.distance_m) > 1e-6:
             bx, by = (x_m - area.x_m) / area.distance_m, (y_m - area.y_m) / area.distance_m
-        elif self.half_width_m < near.distance_m < math.inf:
+        elif near.free_m < near.distance_m < math.inf:
             bx, by = (near.x_m - x_m) / near.distance_m, (near.y_m - y_m) / near.distance_m
         else:
             return None
         return None if vx_mps * bx + vy_mps * by > _BACK_MPS else (bx, by)
+
+
+def _free_m(shelves: Sequence[Shelf], a: Node, b: Node, most_m: float) -> float:
+    """How far the way along an edge is free to both sides."""
+    gaps = (
+        math.hypot(
+            max(min(a.x_m, b.x_m) - shelf.x1_m, shelf.x0_m - max(a.x_m, b.x_m), 0.0),
+            max(min(a.y_m, b.y_m) - shelf.y_m, shelf.y_m - max(a.y_m, b.y_m), 0.0),
+        )
+        for shelf in shelves
+    )
+    return min(most_m, max(min(gaps, default=math.inf) - _BESIDE_SHELF_M, _LEAST_M))
 
 
 def _nearest_of(area: KeepOut, x_m: float, y_m: float) -> Nearest:

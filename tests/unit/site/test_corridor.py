@@ -53,3 +53,17 @@ def test_the_way_back_never_leads_deeper_into_a_keep_out(dx_m: float, dy_m: floa
     if back is not None and before < KEEP_OUT_CLEARANCE_M:
         assert math.hypot(*back) == pytest.approx(1.0)
         assert CORRIDOR.nearest_keep_out(x_m + 0.01 * back[0], y_m + 0.01 * back[1]).distance_m > before
+
+
+def test_between_the_ends_of_racks_the_way_across_is_narrower_than_an_aisle() -> None:
+    racks = load_site(Path(__file__).parents[3] / "configs" / "site-racks.toml")
+    corridor = Corridor(racks, 0.45)
+    a1, b1 = racks.nodes["A1"], racks.nodes["B1"]
+    assert a1.x_m == b1.x_m
+    (end_m, *_) = sorted(shelf.x0_m - a1.x_m for shelf in racks.shelves if shelf.x0_m > a1.x_m)
+    between = (a1.y_m + b1.y_m) / 2
+    assert corridor.outside_m(a1.x_m + end_m - 0.36, between) == 0.0
+    assert corridor.outside_m(a1.x_m + end_m - 0.3, between) == pytest.approx(0.05)
+    assert corridor.back(a1.x_m + end_m - 0.3, between, 0.0, 0.0) == pytest.approx((-1.0, 0.0))
+    assert corridor.outside_m(a1.x_m + end_m - 0.3, a1.y_m) == 0.0, "along the aisle it is on the line"
+    assert corridor.outside_m(a1.x_m + 1.0, a1.y_m + 0.5) == pytest.approx(0.05)
