@@ -12,6 +12,7 @@ are.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -96,7 +97,9 @@ def together(name: str, told: Mapping[str, Any], more: Mapping[str, Any]) -> dic
         raise MixedError(f"{name}: code {more['code']} is not known to be the same; commit it, or --renew")
     if again := set(told["seeds"]) & set(more["seeds"]):
         raise MixedError(f"{name}: told of already: seeds {_seeds_text(sorted(again))}")
-    both: dict[str, Any] = {key: told[key] for key in _ORIGIN}
+    if told.get("scenario") != more.get("scenario"):
+        raise MixedError(f"{name}: its scenario is another one since; --renew tells of these alone")
+    both: dict[str, Any] = {key: told[key] for key in (*_ORIGIN, "scenario") if key in told}
     both |= {"seeds": sorted([*told["seeds"], *more["seeds"]]), "flown": max(told["flown"], more["flown"])}
     for key in [key for key in {**told, **more} if key not in both]:
         values = [found[key] for found in (told, more) if found.get(key) is not None]
@@ -121,7 +124,12 @@ def markdown() -> str:
         shown = evidence.get(name)
         found_by = row.found_by if name == row.name else f"as `{row.name}`"
         cells = [f"`{name}`", _cause(paths[name]), found_by, str(row.action)]
-        cells += ["not yet", *[""] * 8] if shown is None else [*_cells(shown), *_origin_cells(shown)]
+        if shown is None:
+            cells += ["not yet", *[""] * 8]
+        elif shown.get("scenario", _digest(paths[name])) != _digest(paths[name]):
+            cells += ["not since its scenario changed", *[""] * 8]
+        else:
+            cells += [*_cells(shown), *_origin_cells(shown)]
         lines.append(f"| {' | '.join(cells)} |")
     if pairs := told.get("pairs"):
         text = (
@@ -156,6 +164,11 @@ def _seeds_text(seeds: Sequence[int]) -> str:
         else:
             runs.append([seed, seed])
     return ", ".join(f"{first} to {last}" if last > first else f"{first}" for first, last in runs)
+
+
+def _digest(scenario: Path) -> str:
+    """Of what goes wrong in it, by which flights of an older one are told from those of this one."""
+    return hashlib.sha256(scenario.read_bytes()).hexdigest()[:12]
 
 
 def _cause(scenario: Path) -> str:
@@ -193,6 +206,9 @@ def _document(
 ) -> dict[str, Any]:
     """What the file of the evidence holds."""
     hazards, of_pairs = evidence_of(flights), evidence_of_pairs(pairs)
+    paths = shipped_scenarios()
+    for name, row in hazards.items():
+        row["scenario"] = _digest(paths[name])
     if options.add or options.renew:
         told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
         if told["world"] != world:

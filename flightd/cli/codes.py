@@ -46,7 +46,7 @@ def codes(
       flightd codes label.jpg
       flightd codes shelf/ --json
       flightd codes photographs/ --labels photographs/codes.json
-      flightd codes photographs/ --text --config hall.toml
+      flightd codes photographs/ --text --config hall-flight.toml
     """
     from flightd.studies import codes as command
 

@@ -34,9 +34,9 @@ def plan(
 
     \b
     Examples:
-      flightd plan --config hall.toml
-      flightd plan --config hall.toml A4 A5 --level 1
-      flightd plan --config hall.toml --json
+      flightd plan --config hall-flight.toml
+      flightd plan --config hall-flight.toml A4 A5 --level 1
+      flightd plan --config hall-flight.toml --json
     """
     from flightd.app.build import pilot_of
     from flightd.config.schema import load_config

@@ -23,4 +23,6 @@ def check_ground(ground: GroundConfig, link: GroundListener | None) -> list[Chec
             keys = "with keys" if ground.server_key else "without keys, this machine only"
             return [ok("ground", f"can listen on {text}, {keys}")]
     except UnavailableError as err:
+        if err.remedy:
+            return [error("ground", f"{err.file}: {err.what}", err.remedy)]
         return [error("ground", str(err), "stop what has the port (another flightd?), or choose another")]

@@ -48,7 +48,12 @@ class AuditLog:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._open()
         except OSError as err:
-            raise UnavailableError(f"{path}: cannot write the audit log: {err.strerror}") from None
+            raise UnavailableError(
+                f"cannot write the audit log: {err.strerror}",
+                file=path,
+                key="ground.audit",
+                remedy="make it and its folder writable for the user who runs this",
+            ) from None
         self._thread = threading.Thread(target=self._write_all, name="audit", daemon=True)
         self._thread.start()
 

@@ -60,7 +60,7 @@ def _ray() -> Any:
         raise UnavailableError(
             "Ray is not installed",
             key="--engine ray",
-            remedy="pip install 'flightd[ray]', or take --engine local",
+            remedy="pip install -e '.[ray]' in the checkout, or take --engine local",
         ) from None
     return ray
 

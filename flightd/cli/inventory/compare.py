@@ -76,7 +76,7 @@ def compare(
     Examples:
       flightd inventory compare out/inventory stock.csv
       flightd inventory compare out/sim stock.csv --recount recount.toml --aisles A --at-most 20
-      flightd inventory compare out/inventory stock.csv --recount recount.toml --config hall.toml
+      flightd inventory compare out/inventory stock.csv --recount recount.toml --config hall-flight.toml
     """
     from flightd.adapters.store.for_reading import opened_for_reading
     from flightd.inventory.comparison import compare_stock, comparison_document, doubtful_locations

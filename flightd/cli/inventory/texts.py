@@ -32,7 +32,7 @@ def texts(
 
     \b
     Examples:
-      flightd inventory texts out/inventory --config hall.toml
+      flightd inventory texts out/inventory --config hall-flight.toml
     """
     from flightd.adapters.store.sqlite import SqliteStore
     from flightd.config.schema import load_config

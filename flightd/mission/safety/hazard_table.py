@@ -115,10 +115,10 @@ HAZARDS: tuple[Hazard, ...] = (
         None,
         "the autopilot hears neither heartbeats nor setpoints of this computer",
         Action.LAND,
-        "level after 0.3 s (PX4: half a second), then, within a second of its death, the autopilot lands"
-        " by itself (ArduPilot: `FS_GCS_ENABLE`, `FS_GCS_TIMEOUT`, `SYSID_MYGCS`; PX4: `COM_OF_LOSS_T`,"
-        " `COM_OBL_RC_ACT`); an AR.Drone keeps the last lean until it lands after 2 s"
-        " (`general:com_watchdog`); without these nothing is armed",
+        "level after 0.3 s (PX4: half a second), then, within a second of its death, the autopilot begins to"
+        " land by itself (an ArduCopter keeps its height for 4 s first; by `FS_GCS_ENABLE`, `FS_GCS_TIMEOUT`,"
+        " `SYSID_MYGCS`, a PX4 by `COM_OF_LOSS_T`, `COM_OBL_RC_ACT`); an AR.Drone keeps the last lean until"
+        " it lands after 2 s (`general:com_watchdog`); without these nothing is armed",
         "tests/protocol/mavlink/test_companion_dead.py",
     ),
     Hazard(

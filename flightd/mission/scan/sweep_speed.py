@@ -16,6 +16,8 @@ from flightd.site.coverage import MAX_BLUR_MODULES, FrontView, Legibility
 _POSE_M = 0.04
 _POSE_RAD = math.radians(2.0)
 """How far off the picture may lie on the shelf: the drone's place, and its heading."""
+_CRAWL_MPS = 0.1
+"""Slower than this a place is passed in no less time than a stop before it takes."""
 
 
 class Limit(enum.StrEnum):
@@ -33,7 +35,7 @@ class StopCause(enum.StrEnum):
     LABELS = "labels"
     """Their labels are too small in the picture."""
     WIDTH = "width"
-    """A place is wider than the picture."""
+    """A place is nearly as wide as the picture, or wider: to stop before it is quicker than to crawl past."""
     LINE = "line"
     """The line is not open both ways, or not clear at that height."""
     NODES = "nodes"
@@ -84,7 +86,7 @@ class SweepSpeed:
     which a place is wholly in the picture, `views` how many pictures that gives, `fps` how many frames are
     read in a second and `needed_fps` how many this speed needs; `limits_mps` what each limit alone allows,
     `limit` the lowest of them.  0 m/s where a place is wider than the picture.  `stops_for` is why it is not
-    flown past, None if it may be: the labels are large enough in the picture, and a place fits it."""
+    flown past, None if it may be: the labels are large enough in the picture, and a place fits well."""
 
     speed_mps: float
     limit: Limit
@@ -118,7 +120,7 @@ def sweep_speed(shelf: Shelf, optics: SweepOptics) -> SweepSpeed:
     # no darker than the speed asks for
     exposure = min(1.0, view.speed_limit_mps() / speed_mps) if speed_mps > 0.0 else 1.0
     px = view.px_per_module(shelf.distance_m)
-    stops_for = None if window_m > 0.0 else StopCause.WIDTH
+    stops_for = None if limits[Limit.OVERLAP] >= _CRAWL_MPS else StopCause.WIDTH
     if view.legibility(shelf.distance_m) is not Legibility.SURE:
         stops_for = StopCause.LABELS
     return SweepSpeed(

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tools import safety_case
-from tools.safety_case import MixedError, evidence_of, evidence_of_pairs, together
+from tools.safety_case import EVIDENCE, MixedError, evidence_of, evidence_of_pairs, markdown, together
 
 
 def flight(
@@ -91,3 +91,21 @@ def test_evidence_from_before_origins_were_kept_is_shown_and_only_renewed(
     rows = {line.split(" | ")[0]: line for line in safety_case.markdown().splitlines()}
     assert rows["| `wind`"].endswith("| 1 to 2 | 2026-11-02 | px4, aaa |")
     assert rows["| `pilot`"].endswith("| not kept | not kept | not kept |")
+
+
+def test_flights_of_a_scenario_as_it_was_are_no_evidence_of_what_it_is_now(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
+    (name, row), *_ = told["hazards"].items()
+    told["hazards"][name] = row | {"scenario": "another"}
+    changed = tmp_path / EVIDENCE.name
+    changed.write_text(json.dumps(told), encoding="utf-8")
+    assert markdown().count("| not since its scenario changed |") == 0
+    monkeypatch.setattr(safety_case, "EVIDENCE", changed)
+    assert markdown().count("| not since its scenario changed |") == 1
+    (first,) = evidence_of(FIRST).values()
+    (second,) = evidence_of(SECOND).values()
+    with pytest.raises(MixedError, match="its scenario is another one since"):
+        together("wind", first | {"scenario": "a"}, second | {"scenario": "b"})
+    assert together("wind", first | {"scenario": "a"}, second | {"scenario": "a"})["scenario"] == "a"

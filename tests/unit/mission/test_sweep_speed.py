@@ -119,3 +119,11 @@ def test_labels_too_small_in_the_picture_are_not_flown_past() -> None:
 def test_places_that_are_wider_than_the_picture_are_not_flown_past() -> None:
     speed = sweep_speed(Shelf(1.2, 3.0), of())
     assert (speed.stops_for, speed.speed_mps, speed.needed_fps) == (StopCause.WIDTH, 0.0, 0.0)
+
+
+def test_a_place_that_could_only_be_crawled_past_is_stopped_before() -> None:
+    """Two centimetres of way on which it is wholly in the picture."""
+    wide_m = next(m / 100 for m in range(300, 0, -1) if sweep_speed(Shelf(1.2, m / 100), of()).window_m > 0.0)
+    crawl = sweep_speed(Shelf(1.2, wide_m), of())
+    assert (crawl.limit, crawl.stops_for) == (Limit.OVERLAP, StopCause.WIDTH)
+    assert sweep_speed(Shelf(1.2, wide_m - 0.3), of()).stops_for is None
