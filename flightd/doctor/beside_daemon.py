@@ -15,6 +15,7 @@ from flightd.doctor.exposure import Seen, check_exposure, check_front_exposure
 from flightd.doctor.labels import check_labels
 from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.doctor.pose import check_pose
+from flightd.doctor.written_files import check_written
 from flightd.site.site import Site
 
 _OLD_S = 3.0
@@ -45,6 +46,7 @@ def check_here(config: Config, site: Site) -> list[Check]:
     return [
         check_clock(),
         check_disk(config.recorder),
+        *check_written(config),
         *check_processor(config.vision.workers),
         *check_calibration(config.camera, site, config.mission.height_m),
         *check_learnt(config),

@@ -31,6 +31,7 @@ from flightd.doctor.latency import (
     with_latency,
 )
 from flightd.doctor.vehicle import Autopilot
+from flightd.doctor.written_files import check_written
 from flightd.ports import Clock
 from flightd.site.site import Site
 from flightd.vision.line_detector import Detector
@@ -164,6 +165,7 @@ def _check_machine(subject: Subject) -> list[Check]:
         ok("config", text),
         machine.check_clock(),
         machine.check_disk(config.recorder),
+        *check_written(config),
         *machine.check_processor(config.vision.workers),
         *check_lamp(config),
         *check_labels(config, site),

@@ -39,6 +39,7 @@ from flightd.doctor.latency import (
 )
 from flightd.doctor.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
 from flightd.doctor.vehicle import judge as judge_vehicle
+from flightd.doctor.written_files import check_written
 from flightd.site.site_file import load_site
 from flightd.tracking.delay_by_tilt import DelayByTilt
 from flightd.vision.line_detector import Detector
@@ -334,3 +335,20 @@ def test_printed_text_that_nothing_is_there_to_read_is_told(monkeypatch: pytest.
     assert "-m pip install" in checks[0].remedy
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
     assert check_text(config().with_values(scan=text)) == []
+
+
+def test_what_the_daemon_keeps_between_flights_must_be_its_own_to_write(tmp_path: Path) -> None:
+    shut = tmp_path / "etc"
+    shut.write_text("")  # a file in the place of a folder: nobody may write below it, not even root
+    kept = {
+        "mission": {"progress": shut / "progress.json"},
+        "inventory": {"folder": tmp_path / "new" / "inventory"},
+        "tracking": {"learnt": tmp_path / "sensors.json"},
+    }
+    (check,) = check_written(config().with_values(**kept))
+    assert check.level is CheckLevel.ERROR
+    assert check.text == f"mission.progress {shut / 'progress.json'} cannot be written"
+    del kept["mission"]
+    (check,) = check_written(config().with_values(**kept))
+    assert (check.level, check.text) == (CheckLevel.OK, "can write inventory.folder, tracking.learnt")
+    assert not (tmp_path / "new").exists()

@@ -1,0 +1,41 @@
+"""May the daemon write what it keeps between flights?"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from flightd.config.schema import Config
+from flightd.doctor.check import Check, error, ok
+
+_REMEDY = (
+    "give this user the right to write there, or choose another place (the service's is /var/lib/flightd)"
+)
+
+
+def check_written(config: Config) -> list[Check]:
+    """A complaint for each file or folder that is to be written and cannot be; nothing is made here.  The
+    flight log's folder is looked at with its disk, the audit log with the ground link."""
+    wanted = {
+        "inventory.folder": config.inventory.folder,
+        "mission.progress": config.mission.progress,
+        "tracking.learnt": config.tracking.learnt,
+        "vehicle.signing_stamp": config.vehicle.stamp_file,
+    }
+    wanted = {key: path for key, path in wanted.items() if path is not None}
+    refused = [
+        error("files", f"{key} {path} cannot be written", _REMEDY)
+        for key, path in wanted.items()
+        if path is not None and not _may_be_written(path)
+    ]
+    return refused or ([ok("files", f"can write {', '.join(wanted)}")] if wanted else [])
+
+
+def _may_be_written(path: Path) -> bool:
+    """The file or folder itself where it is there, and the folder in which it is made or replaced."""
+    folder = next(above for above in path.absolute().parents if above.exists())
+    return folder.is_dir() and _open_to_us(folder) and (not path.exists() or _open_to_us(path))
+
+
+def _open_to_us(path: Path) -> bool:
+    return os.access(path, os.W_OK | os.X_OK if path.is_dir() else os.W_OK)
