@@ -31,3 +31,14 @@ class ExposureMotion(NamedTuple):
     speed_mps: tuple[float, float]
     variances: tuple[float, float]
     since_m: tuple[float, float]
+
+
+class Carried(NamedTuple):
+    """The motion after a while that was dead-reckoned: along both grid axes each, `way_m` what was flown."""
+
+    velocity_mps: tuple[float, float]
+    way_m: tuple[float, float]
+    accel_mps2: tuple[float, float]
+
+
+AT_REST = Carried((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))

@@ -19,7 +19,7 @@ from flightd.core.tracks import NOT_SEEN, FloorJunction, MarkerOffset, PadOffset
 from flightd.core.types import Attitude, LineSet
 from flightd.tracking.attitude_history import AttitudeHistory
 from flightd.tracking.carried_heading import CarriedHeading
-from flightd.tracking.carried_motion import NO_LEAD, ExposureMotion, Lead
+from flightd.tracking.carried_motion import AT_REST, NO_LEAD, Carried, ExposureMotion, Lead
 from flightd.tracking.corrected_view import corrected_attitude, corrected_lens, corrected_mount
 from flightd.tracking.feature_trust import FeatureTrust, SeenFrame
 from flightd.tracking.floor_filter import FloorFilter
@@ -212,13 +212,7 @@ class LineTracker:
         if attitude is None or not self._headed or lines.stamp_ns <= self._told_ns:
             self.rejected += 1
             return False
-        view = self._view(attitude, stamp_ns, height_m, self._lens)
-        by_width_m = [one for one in heights_by_width(lines.lines, view, self._line_width_m) if one > 0.0]
-        off_share = self._filter.mean(HEIGHT) + self._filter.mean(HEIGHT_SCALE)
-        climbed_m = climbed_between_m(climb_mps, self.delay_sigma_s)
-        height_m = self._widths.believed_m(by_width_m, height_m, stamp_ns, climbed_m) * (1.0 + off_share)
-        by_lens = 1.0 - self._filter.mean(SCALE)
-        height_m = self._near_floor.height_m([by_lens * one for one in by_width_m], height_m, stamp_ns)
+        height_m = self._height_m(lines, attitude, stamp_ns, height_m, climb_mps)
         if not height_m > 0:
             self.rejected += 1
             return False
@@ -249,14 +243,30 @@ class LineTracker:
         by_lines = self._filter.lines_seen(stamp_ns), self._filter.speeds(stamp_ns)
         self._trust.step(SeenFrame(stamp_ns, height_m, places, *by_lines))
         self._seen_in = None if assumed else attitude
-        yaw = attitude.yaw_rad + self._filter.mean(PSI)
+        self._place_marks(lines, view, attitude.yaw_rad + self._filter.mean(PSI))
+        if sights:
+            self._lines_ns, self._stands = stamp_ns, False
+        return True
+
+    def _height_m(
+        self, lines: LineSet, attitude: Attitude, stamp_ns: int, told_m: float, climb_mps: float
+    ) -> float:
+        """The height from which a frame was seen, by what was told of it, by what the lines' width says, and
+        by what has been learnt of both; not above 0 where there is none."""
+        view = self._view(attitude, stamp_ns, told_m, self._lens)
+        by_width_m = [one for one in heights_by_width(lines.lines, view, self._line_width_m) if one > 0.0]
+        off_share = self._filter.mean(HEIGHT) + self._filter.mean(HEIGHT_SCALE)
+        climbed_m = climbed_between_m(climb_mps, self.delay_sigma_s)
+        height_m = self._widths.believed_m(by_width_m, told_m, stamp_ns, climbed_m) * (1.0 + off_share)
+        by_lens = 1.0 - self._filter.mean(SCALE)
+        return self._near_floor.height_m([by_lens * one for one in by_width_m], height_m, stamp_ns)
+
+    def _place_marks(self, lines: LineSet, view: FloorView, yaw: float) -> None:
+        """Where pads, markers and junctions of a frame lie, as the filter has it now."""
         self._pads = tuple(PadOffset(x, y, side) for _, x, y, side in placed_squares(lines.pads, view, yaw))
         marks = placed_squares(lines.markers, view, yaw)
         self._markers = tuple(MarkerOffset(mark.id, x, y, side) for mark, x, y, side in marks)
         self._junctions = floor_junctions(lines.junctions, view, yaw)
-        if sights:
-            self._lines_ns, self._stands = stamp_ns, False
-        return True
 
     def _as_of_one_moment(
         self, lines: LineSet, attitude: Attitude, stamp_ns: int, height_m: float
@@ -289,7 +299,7 @@ class LineTracker:
             wrap_pi(seen_in.yaw_rad + held.mean(PSI)),
             (held.mean(VX), held.mean(VY)),
             (variances[0], variances[1]),
-            self._carried_to(now_ns)[2:4],
+            self._carried_to(now_ns).way_m,
         )
 
     def at(self, now_ns: int) -> TrackSet | None:
@@ -301,7 +311,8 @@ class LineTracker:
         held = self._filter
         yaw = wrap_pi(newest.yaw_rad + held.mean(PSI))
         known_ns = now_ns - self._forget_ns
-        vx, vy, moved_x, moved_y, ax, ay = self._carried_to(now_ns)
+        carried = self._carried_to(now_ns)
+        moved_x, moved_y = carried.way_m
         ahead_s, goes_on = (now_ns - self._stamp_ns) * 1e-9, self._stamp_ns > known_ns
         sigma_x, sigma_y = self._speed_sigma(0, ahead_s), self._speed_sigma(1, ahead_s)
         across_x, across_y = (self._lines(0), self._lines(1)) if goes_on else ((), ())
@@ -310,10 +321,8 @@ class LineTracker:
             self._lines_ns,
             yaw,
             held.sigma(PSI),
-            vx,
-            vy,
-            ax,
-            ay,
+            *carried.velocity_mps,
+            *carried.accel_mps2,
             tuple(line.moved(moved_x, moved_y, sigma_x * ahead_s) for line in across_x),
             tuple(line.moved(moved_y, moved_x, sigma_y * ahead_s) for line in across_y),
             tuple(pad.moved(moved_x, moved_y) for pad in self._pads),
@@ -341,10 +350,10 @@ class LineTracker:
         yaw_now, yaw_then = (self._attitude_at(stamp_ns).yaw_rad for stamp_ns in (now_ns, then_ns))
         if self._stands:
             return NO_LEAD._replace(yaw_rad=wrap_pi(yaw_then - yaw_now))
-        vx, vy = self._carried_to(now_ns)[:2]
-        then_vx, then_vy, moved_x, moved_y = self._carried(now_ns, then_ns, vx, vy)[:4]
-        turned, after_s = wrap_pi(yaw_then - yaw_now), (then_ns - now_ns) * 1e-9
-        return Lead(moved_x, moved_y, then_vx - vx, then_vy - vy, turned, after_s)
+        vx, vy = self._carried_to(now_ns).velocity_mps
+        then = self._carried(now_ns, then_ns, vx, vy)
+        (then_vx, then_vy), turned = then.velocity_mps, wrap_pi(yaw_then - yaw_now)
+        return Lead(*then.way_m, then_vx - vx, then_vy - vy, turned, (then_ns - now_ns) * 1e-9)
 
     def unleant(self, now_ns: int) -> tuple[float, float]:
         """Acceleration along the grid axes (m/s2) that the told lean does not explain: push of the air and
@@ -357,18 +366,16 @@ class LineTracker:
         push = held.push_after(0, ahead_s), held.push_after(1, ahead_s)
         return ax - as_told[0] + push[0], ay - as_told[1] + push[1]
 
-    def _carried_to(self, now_ns: int) -> tuple[float, float, float, float, float, float]:
-        """Velocity, way and acceleration as `_carried` has them from the newest frame on; a longer blindness
-        than is remembered is not bridged by prediction."""
+    def _carried_to(self, now_ns: int) -> Carried:
+        """The motion from the newest frame on; a longer blindness than is remembered is not bridged by
+        prediction."""
         if self._stands:
-            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            return AT_REST
         since_ns = max(self._stamp_ns, now_ns - self._forget_ns)
         return self._carried(since_ns, now_ns, self._filter.mean(VX), self._filter.mean(VY))
 
-    def _carried(
-        self, from_ns: int, to_ns: int, vx: float, vy: float
-    ) -> tuple[float, float, float, float, float, float]:
-        """Velocity, way and acceleration along both axes after flying on in the attitude told or assumed."""
+    def _carried(self, from_ns: int, to_ns: int, vx: float, vy: float) -> Carried:
+        """The motion after flying on with a velocity in the attitude told or assumed."""
         pushed, drag = self._filter.carrier(), self._params.noise.drag_per_s
         moved_x = moved_y = ax = ay = 0.0
         stamp_ns = from_ns
@@ -383,7 +390,7 @@ class LineTracker:
             vx += ax * dt_s
             vy += ay * dt_s
             stamp_ns += step_ns
-        return vx, vy, moved_x, moved_y, ax, ay
+        return Carried((vx, vy), (moved_x, moved_y), (ax, ay))
 
     def _features(self, lines: LineSet, view: FloorView, yaw_rad: float) -> list[FeatureSight]:
         """The features of one frame.  Without an exact compensation they do not move as its lines do."""
