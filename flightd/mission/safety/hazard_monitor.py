@@ -15,9 +15,9 @@ from flightd.mission.safety.hazard_table import Action, triggers_of
 from flightd.mission.safety.view_monitor import FloorViewMonitor
 from flightd.mission.triggers import Trigger
 
-_HEARTBEAT_S = 2.0
+HEARTBEAT_S = 2.0
 """A heartbeat comes each second; older than this, modes and arming are those of the past."""
-_GIVE_UP_S = 60.0
+GIVE_UP_S = 60.0
 """A vehicle that nobody heard for so long while it should land is not waited for."""
 _TICK_S = 0.06
 _GAP_S = 0.3
@@ -120,7 +120,7 @@ class HazardMonitor:
         return p.battery_land <= charge.frac < p.battery_home or charge.low
 
     def _authority(self, s: MissionInputs, v: VehicleState) -> set[Trigger]:
-        silent_s = max(s.telemetry_age_s, (s.now_ns - v.heartbeat_ns) * 1e-9 - _HEARTBEAT_S)
+        silent_s = max(s.telemetry_age_s, (s.now_ns - v.heartbeat_ns) * 1e-9 - HEARTBEAT_S)
         if silent_s >= self._params.telemetry_hold_s:
             return set()  # silence is no pilot: a lost link is lost
         if not v.armed:
@@ -152,7 +152,7 @@ class HazardMonitor:
         return {
             Trigger.TELEMETRY_STALE: (age_s > p.telemetry_hold_s, 0.0),
             Trigger.TELEMETRY_LOST: (age_s > p.telemetry_land_s, 0.0),
-            Trigger.VANISHED: (max(age_s, beat_s) > p.telemetry_land_s, _GIVE_UP_S),
+            Trigger.VANISHED: (max(age_s, beat_s) > p.telemetry_land_s, GIVE_UP_S),
             Trigger.HEIGHT_LOST: (math.isnan(s.height_m), p.telemetry_land_s),
         }
 

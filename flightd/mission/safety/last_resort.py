@@ -25,22 +25,20 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
+from flightd.mission.safety.hazard_monitor import GIVE_UP_S, HEARTBEAT_S
 from flightd.mission.safety.hazard_table import ACTIONS
 from flightd.mission.triggers import Trigger
 
 _T = TypeVar("_T")
 
-_HEARTBEAT_NS = 2_000_000_000
-"""Heartbeats come each second: without a newer one, modes and arming are those of the past."""
-_GIVE_UP_NS = 60_000_000_000
-"""A vehicle that nobody heard for so long is not waited for."""
+_HEARTBEAT_NS, _GIVE_UP_NS = round(HEARTBEAT_S * 1e9), round(GIVE_UP_S * 1e9)
 _BY_SIGHT_NS = 20_000_000_000
 """For so long it may sink by the lines: from higher its autopilot goes on."""
 _LEFT_TO_AUTOPILOT_M = 0.4
 _DOWN = frozenset({CommandKind.STOP, CommandKind.LAND})
 _SIGHT_S, _TOLD_S = 0.3, 0.2
 """How old the floor's picture and the attitude may be to sink by them."""
-# constants: what is answered here calls as little as possible of what may have failed
+# constants, all of them: what is answered here calls as little as possible of what may have failed
 _WHY = Trigger.STEP_FAILED.value
 _ACTION = ACTIONS[Trigger.STEP_FAILED].value
 
