@@ -109,6 +109,10 @@ def settings(unit: Path) -> set[str]:
     return {line for line in unit.read_text().splitlines() if line[:1] not in {"", "#", "["}}
 
 
+def test_a_daemon_that_dies_takes_no_child_with_it() -> None:
+    assert "KillMode=process" in settings(UNIT), "its writer finishes the log, see test_orphans"
+
+
 @pytest.mark.parametrize("unit", [UNIT, GROUND_UNIT], ids=lambda unit: unit.stem)
 def test_what_gives_way_to_the_flight_may_do_so(unit: Path) -> None:
     allowed = allowed_calls(unit)
