@@ -69,6 +69,11 @@ class TelemetryPublishers:
         if snapshot.stamp_ns - self._told_ns >= _STATUS_NS or snapshot.phase is not self._told_phase:
             self._tell(snapshot)
 
+    def over(self) -> None:
+        """No tick follows."""
+        for monitor in self._monitors:
+            self.barrier.call("monitor", monitor.over, None)
+
     def _tell(self, snapshot: Snapshot) -> None:
         """How the flight stands."""
         self._told_ns, self._told_phase = snapshot.stamp_ns, snapshot.phase
