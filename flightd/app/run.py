@@ -159,29 +159,32 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
         if run.taken_back:
             daemon.failed(TransientError(run.taken_back))
         async with room_kept(archive, daemon.failed):
-            return await _flown(daemon, maintainer, run.file)
+            return await flown(daemon, maintainer, run.file)
 
 
-async def _flown(
+async def flown(
     daemon: Daemon, maintainer: DroneMaintainer, file: SettingsFile
 ) -> FlightResult | RestartAsked:
     """The flight, unless the ground has the daemon started anew before it begins."""
     settled = asyncio.ensure_future(_settled(file))
     flying = asyncio.ensure_future(daemon.fly())
     leaving = asyncio.ensure_future(maintainer.restart_asked())
+    came_up = False
     try:
         await asyncio.wait([flying, leaving], return_when=asyncio.FIRST_COMPLETED)
     except asyncio.CancelledError:  # a signal: it ends as it should
-        file.confirm()
+        came_up = True
         raise
     else:
         result = flying.result() if flying.done() else RestartAsked()
-        file.confirm()
+        came_up = True
         return result
     finally:
         for task in (settled, leaving, flying):
             task.cancel()
         await asyncio.wait([flying, leaving, settled])
+        if came_up:  # only now: the vehicle was handed back, and the disk may take its time
+            await asyncio.to_thread(file.confirm)
 
 
 async def _settled(file: SettingsFile) -> None:
