@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import os
 import platform
@@ -166,6 +167,10 @@ async def flown(
     daemon: Daemon, maintainer: DroneMaintainer, file: SettingsFile
 ) -> FlightResult | RestartAsked:
     """The flight, unless the ground has the daemon started anew before it begins."""
+    # What start-up made stays to the end: a full collection that walked it again in flight held the control
+    # tick up for 60 to 90 ms.
+    gc.collect()
+    gc.freeze()
     settled = asyncio.ensure_future(_settled(file))
     flying = asyncio.ensure_future(daemon.fly())
     leaving = asyncio.ensure_future(maintainer.restart_asked())

@@ -1,8 +1,9 @@
-"""How `flightd run` ends: the vehicle first, whatever the disk does and however often a signal comes."""
+"""How `flightd run` begins a flight and ends it: the vehicle first, whatever disk and signals do."""
 
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import signal
 import threading
@@ -27,8 +28,10 @@ class Flight:
         self.leaves = asyncio.Event()
         self.flies = asyncio.Event()
         self._ends = ends
+        self.frozen = 0
 
     async def fly(self) -> None:
+        self.frozen = gc.get_freeze_count()
         self.flies.set()
         if self._ends is not None:
             raise self._ends
@@ -46,7 +49,10 @@ class Flight:
         self.ended.append("settings confirmed beside the loop" if beside else "settings confirmed")
 
     async def flown(self) -> Any:
-        return await flown(cast(Daemon, self), cast(DroneMaintainer, self), cast(SettingsFile, self))
+        try:
+            return await flown(cast(Daemon, self), cast(DroneMaintainer, self), cast(SettingsFile, self))
+        finally:
+            gc.unfreeze()
 
 
 IN_ORDER = ["handed back", "settings confirmed beside the loop"]
@@ -77,6 +83,17 @@ def test_a_restart_that_is_asked_for_ends_in_the_same_order() -> None:
         flight.leaves.set()
         assert isinstance(await flight.flown(), RestartAsked)
         assert flight.ended == IN_ORDER
+
+    real(test())
+
+
+def test_no_collection_in_flight_walks_what_was_there_before() -> None:
+    async def test() -> None:
+        flight = Flight()
+        flight.leaves.set()
+        made_before = len(gc.get_objects())
+        await flight.flown()
+        assert flight.frozen > made_before / 2, "but for what was garbage"
 
     real(test())
 
