@@ -17,8 +17,8 @@ _RECORDS = """
 import sys
 from pathlib import Path
 from flightd.adapters.recorder.recorder import McapRecorder
-from tests.rigs.denied_calls import deny_setpriority
-deny_setpriority()
+from tests.rigs.denied_calls import deny
+deny("setpriority")
 with McapRecorder(Path(sys.argv[1])) as recorder:
     recorder.record("/some", 1, {"value": 1})
 print(recorder.written, recorder.restarts)
@@ -28,9 +28,9 @@ import os, sys
 from flightd.app.counting.code_readers import read_frame
 from flightd.app.counting import code_readers
 from flightd.ground import reading_process
-from tests.rigs.denied_calls import deny_setpriority
+from tests.rigs.denied_calls import deny
 if sys.argv[1] == "denied":
-    deny_setpriority()
+    deny("setpriority")
 before = os.getpriority(os.PRIO_PROCESS, 0)
 assert code_readers._shelf_reader() is read_frame
 assert reading_process._begin() is reading_process._done
