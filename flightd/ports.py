@@ -191,6 +191,10 @@ class Monitor(Protocol):
         """At once when it happens."""
         ...
 
+    def over(self) -> None:
+        """Once, when no tick follows any more: the flight is over, and its parts are closed now."""
+        ...
+
 
 class Store(Protocol):
     """The inventory, kept through a power cut.

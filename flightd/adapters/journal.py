@@ -72,6 +72,9 @@ class JournalMonitor:
     def event(self, event: Event) -> None:
         self._write(line(_PRIORITY[event.level], event=event.name, text=event.text))
 
+    def over(self) -> None:
+        """The last change of phase has said so."""
+
     def _write(self, text: str) -> None:
         self._out.write(text + "\n")
         self._out.flush()

@@ -38,6 +38,9 @@ class RecentLog(logging.Handler):
     def event(self, event: Event) -> None:
         self._keep(event.level.value, f"{event.name}: {event.text}")
 
+    def over(self) -> None:
+        """It goes on taking what is logged."""
+
     def _keep(self, level: str, text: str) -> None:
         line = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {level} {' '.join(text.split())}"
         self._lines.append(line[:_LONGEST])

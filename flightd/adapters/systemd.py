@@ -50,7 +50,7 @@ class Notifier:
 
 class SystemdMonitor:
     """`ports.Monitor`: READY=1 once the vehicle is heard and frames come through the detector, WATCHDOG=1
-    with the ticks' statuses, a line of STATUS for people.
+    with the ticks' statuses, a line of STATUS for people, STOPPING=1 when no tick follows.
 
     The watchdog's messages go out four times in the period that systemd asks for, so long as the control
     tick runs: no timer of its own could stand in for a tick that hangs.
@@ -59,7 +59,7 @@ class SystemdMonitor:
     def __init__(self, notifier: Notifier, watchdog_us: int = 0) -> None:
         self._notifier = notifier
         self._watchdog_ns = watchdog_us * 1000 // 4
-        self._ready = False
+        self._ready = self._stopping = False
         self._fed_ns = self._extended_ns = self._told_ns = -(10**18)
         self._told = ""
 
@@ -95,8 +95,15 @@ class SystemdMonitor:
     def event(self, event: Event) -> None:
         """Events are the log's."""
 
+    def over(self) -> None:
+        """Say STOPPING=1: the watchdog, which no tick feeds any more, is off from then on, and files may take
+        until the stop's own time-out to be finished."""
+        if not self._stopping:
+            self._stopping = True
+            self._notifier.send(STOPPING=1)
+
     def close(self) -> None:
-        self._notifier.send(STOPPING=1)
+        self.over()
         self._notifier.close()
 
     def _say(self, now_ns: int, line: str) -> None:

@@ -46,3 +46,6 @@ class ArmedMark:
 
     def event(self, event: Event) -> None:
         """Arming is in the status."""
+
+    def over(self) -> None:
+        """What the vehicle does then is not known: the mark stays as it is."""

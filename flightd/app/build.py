@@ -129,7 +129,7 @@ def build(
     publishers = TelemetryPublishers(clock, vehicle, recorder, ground, monitors, observers)
     kept_fps = 0.0 if recorder is NO_RECORDER else config.recorder.picture_fps
     vision = DetectionPipeline(
-        detectors, config.vision.workers, recorder, ground, kept_fps, config.camera.lens()
+        detectors, config.vision.workers, recorder, ground, kept_fps, config.camera.lens(), publishers.pace
     )
     connect = partial(connect_camera, clock=clock, on_trouble=publishers.trouble, vehicle=vehicle, hold=hold)
     down_frames = FrameTap(vision.frames.put)

@@ -68,7 +68,10 @@ class Daemon:
         try:
             async with asyncio.TaskGroup() as tasks:
                 parts = [tasks.create_task(part, name=name) for name, part in self._parts().items()]
-                await self._tick_until_over()
+                try:
+                    await self._tick_until_over()
+                finally:  # also where it is cancelled: what follows is to be waited for
+                    self._flight.publishers.over()
                 for part in parts:
                     part.cancel()
         except ExceptionGroup as group:

@@ -28,18 +28,22 @@ def configured_order(config: Config) -> FlightOrder:
     )
 
 
-def resumed(order: FlightOrder, config: Config, path: Path, site: Site, *, wanted: bool) -> FlightOrder:
+def resumed(
+    order: FlightOrder, config: Config, path: Path, site: Site, *, wanted: bool, in_air: bool = False
+) -> FlightOrder:
     """The order with the stops left over by the last flight in place of its own, if `wanted` or configured
-    in the file `path`.  InputError when nothing can be resumed that is wanted."""
+    in the file `path`.  InputError when nothing can be resumed that is wanted, but not where the vehicle may
+    be `in_air` already."""
     kept = config.mission.progress
-    if wanted and kept is None:
+    if wanted and kept is None and not in_air:
         raise InputError(f"config {path}: mission.progress names no file, so that nothing can be resumed")
     if kept is None or not (wanted or config.mission.resume):
         return order
     try:
         left = load_left_over(kept, site)
-    except NothingLeftError:
-        if wanted:
+    except InputError as err:
+        finished = isinstance(err, NothingLeftError) and not wanted
+        if not (finished or in_air):
             raise
         return order  # the last flight was finished: a new one begins
     return replace(

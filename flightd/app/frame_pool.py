@@ -7,6 +7,7 @@ pool never raises into its user: a lost frame is simply no answer (None).
 from __future__ import annotations
 
 import asyncio
+import re
 from collections import Counter, OrderedDict
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -30,6 +31,8 @@ FoundT_co = TypeVar("FoundT_co", covariant=True)
 _MAX_RINGS = 4
 _STOOD_STILL_S = 0.1
 """A timer that is late by more shows that the loop stood still."""
+_NUMBER = re.compile(r"\d+")
+_MOST_KINDS, _OTHERS = 20, "others"
 _HOPELESS = 8
 """Workers that died in a row without one being ready."""
 
@@ -147,10 +150,15 @@ class FramePool(Generic[AskT, FoundT]):
         if worker.alive:
             self._idle.put_nowait(worker)
         if isinstance(answer, str):
-            self.lost[answer.split(":", maxsplit=1)[0]] += 1
+            self._lose(answer.split(":", maxsplit=1)[0])
             return None
         found: FoundT = answer[0]
         return found
+
+    def _lose(self, why: str) -> None:
+        """Count a lost frame by why: many reasons name it, so that each would be one of its own."""
+        kind = _NUMBER.sub("N", why)
+        self.lost[kind if kind in self.lost or len(self.lost) < _MOST_KINDS else _OTHERS] += 1
 
     async def _in_time(self, worker: Child, request: tuple[FrameTicket, AskT]) -> _Answer:
         """The worker's answer; TransientError when it died over it, or was killed because it hung.  Where

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+from flightd.app.record_pace import RecordPace
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import StepFailure
 from flightd.core.topics import DronePlace, Topic
@@ -18,7 +19,7 @@ _STATUS_NS = 100_000_000
 
 class TelemetryPublishers:
     """Tells each of them what it is there for; none of them can keep the control tick waiting, or end it.
-    `barrier` keeps what a part raises from the tick."""
+    `barrier` keeps what a part raises from the tick, `pace` says what of it is recorded."""
 
     def __init__(
         self,
@@ -36,6 +37,7 @@ class TelemetryPublishers:
         self._monitors = tuple(monitors)
         self._observers = tuple(observers)
         self.barrier = FaultBarrier(self._failed)
+        self.pace = RecordPace()
         self._told_ns = 0
         self._told_phase: Phase | None = None
         self._late_s: list[float] = []
@@ -59,25 +61,34 @@ class TelemetryPublishers:
         self.trouble(failure.error)
 
     def publish(self, snapshot: Snapshot) -> None:
-        """A tick: its events to everybody, all of it to the record; ten times a second and at each change of
-        phase it is told to everybody."""
+        """A tick: its events to everybody, all of it to the record, unless nothing happens for long; ten
+        times a second and at each change of phase it is told to everybody."""
         for event in snapshot.output.events:
             self._event(event)
-        self.barrier.call("recorder", lambda: _record(self._recorder, snapshot), None)
+        self.pace.take(snapshot)
+        if _happens(snapshot) or self.pace.due(Topic.TICK, snapshot.stamp_ns):
+            self.barrier.call("recorder", lambda: _record(self._recorder, snapshot), None)
         self._late_s += snapshot.tick_late_s
         self._latencies_ms += snapshot.latencies_ms
         if snapshot.stamp_ns - self._told_ns >= _STATUS_NS or snapshot.phase is not self._told_phase:
             self._tell(snapshot)
 
+    def over(self) -> None:
+        """No tick follows."""
+        for monitor in self._monitors:
+            self.barrier.call("monitor", monitor.over, None)
+
     def _tell(self, snapshot: Snapshot) -> None:
         """How the flight stands."""
+        changes = snapshot.phase is not self._told_phase
         self._told_ns, self._told_phase = snapshot.stamp_ns, snapshot.phase
         snapshot = replace(snapshot, tick_late_s=tuple(self._late_s), latencies_ms=tuple(self._latencies_ms))
         self._late_s.clear()
         self._latencies_ms.clear()
         call = self.barrier.call
         status = snapshot.status()
-        call("recorder", lambda: self._recorder.record(Topic.STATUS, snapshot.stamp_ns, status), None)
+        if changes or self.pace.due(Topic.STATUS, snapshot.stamp_ns):
+            call("recorder", lambda: self._recorder.record(Topic.STATUS, snapshot.stamp_ns, status), None)
         call("ground link", lambda: self._ground.tell(snapshot), None)
         for monitor in self._monitors:
             call("monitor", partial(monitor.tell, snapshot), None)
@@ -90,6 +101,13 @@ class TelemetryPublishers:
         call("ground link", lambda: self._ground.event(event), None)
         for monitor in self._monitors:
             call("monitor", partial(monitor.event, event), None)
+
+
+def _happens(snapshot: Snapshot) -> bool:
+    """Whether a tick is more than one of many alike."""
+    tick, output = snapshot.tick, snapshot.output
+    happened = tick.commands, tick.codes, tick.counted, output.events, output.findings, output.settled
+    return any(happened) or snapshot.failure is not None
 
 
 def _record(recorder: Recorder, snapshot: Snapshot) -> None:

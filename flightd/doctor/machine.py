@@ -13,7 +13,7 @@ from pathlib import Path
 
 from flightd.config.recorder import RecorderConfig
 from flightd.core.processors import usable_cores
-from flightd.doctor.check import Check, error, ok, warning
+from flightd.doctor.check import Check, error, ok, unseen, warning
 
 _TICK_RESOLUTION_S = 0.001
 _OLDEST_YEAR = 2025
@@ -47,22 +47,27 @@ def check_clock() -> Check:
     )
 
 
-def judge_clock(resolution_s: float, year: int, *, synchronised: bool) -> Check:
-    """The flight itself needs only fine monotonic steps; logs and signed links need the date."""
+def judge_clock(resolution_s: float, year: int, *, synchronised: bool | None) -> Check:
+    """The flight itself needs only fine monotonic steps; logs and signed links need the date.  `synchronised`
+    is None where the system does not say."""
     if resolution_s > _TICK_RESOLUTION_S:
         text = f"the monotonic clock moves in steps of {resolution_s * 1000:g} ms"
         return error("clock", text, "use a kernel with high-resolution timers")
     if year < _OLDEST_YEAR:
         return warning("clock", f"the date says {year}", "set the clock: a signed link and logs need it")
+    if synchronised is None:
+        text = "whether anything keeps the date right: the clock may not be asked here"
+        return unseen("clock", text, "ask timedatectl: logs and signed links need it")
     if not synchronised:
         text = "nothing keeps the date right"
         return warning("clock", text, "run systemd-timesyncd or chrony: logs and signed links need it")
     return ok("clock", "monotonic in fine steps, date synchronised")
 
 
-def _is_synchronised() -> bool:
-    buffer = ctypes.create_string_buffer(_TIMEX_BYTES)
-    return int(ctypes.CDLL(None).adjtimex(buffer)) not in {-1, _UNSYNCHRONISED}
+def _is_synchronised() -> bool | None:
+    """None where the clock may not even be asked, as under the service's limits."""
+    state = int(ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(_TIMEX_BYTES)))
+    return None if state < 0 else state != _UNSYNCHRONISED
 
 
 def check_disk(recorder: RecorderConfig) -> Check:

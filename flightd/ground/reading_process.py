@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
 import resource
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 from flightd.core.errors import FlightdError, TransientError, UnavailableError
 from flightd.ground.bounded import Room
 from flightd.runtime.child_process import Child
+from flightd.runtime.niceness import give_way
 from flightd.runtime.within import Within
 
 MOST_WAITING = 32
@@ -106,8 +106,7 @@ class ReadingProcess:
 
 def _begin() -> Callable[[_Job], object]:
     """In the child: what answers its jobs."""
-    with contextlib.suppress(OSError):
-        os.nice(_NICE)
+    give_way(_NICE)
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
     return _done

@@ -10,8 +10,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import multiprocessing
+import os
+import select
 import signal
 import socket
+import threading
+import time
 from collections.abc import Callable
 from multiprocessing.context import ForkServerContext
 from typing import Any
@@ -28,6 +32,8 @@ _PRELOAD = [
 _READY = "ready"
 _START_S = 60.0
 """A child that is not ready by then hangs."""
+LAST_S = 5.0
+"""For what a child still does without its parent: a camera's exposure is given back, a LED put out."""
 
 
 def child_context() -> ForkServerContext:
@@ -104,10 +110,20 @@ class LinkedProcess:
 
 
 def _live(target: Callable[..., None], link: socket.socket, args: tuple[Any, ...]) -> None:
-    """The child's life: it ends when its parent closes the channel."""
+    """The child's life: it ends when its parent closes the channel, or dies, whatever it is at."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_after, args=(link,), name="parent", daemon=True).start()
     with contextlib.suppress(EOFError, OSError):
         target(ChildEnd(link), *args)
+
+
+def _end_after(link: socket.socket) -> None:
+    """In a thread of the child: nobody is left to kill one that hangs after its parent died."""
+    parent = select.poll()
+    parent.register(link, 0)  # only that its other end is closed
+    parent.poll()
+    time.sleep(LAST_S)
+    os._exit(1)
 
 
 class Child:

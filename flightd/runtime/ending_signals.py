@@ -13,13 +13,15 @@ _ENDING: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 def end_on_signals(flight: asyncio.Future[Any], came: list[signal.Signals]) -> None:
-    """From now on either signal cancels `flight`, so that everything is closed on the way out, and is
-    appended to `came`.  Call it in the running loop."""
+    """From now on the first of either signal cancels `flight`, so that everything is closed on the way out;
+    a second one must not cut that short, the vehicle's being handed back least of all.  All are appended to
+    `came`.  Call it in the running loop."""
     loop = asyncio.get_running_loop()
 
     def end(number: signal.Signals) -> None:
         came.append(number)
-        flight.cancel()
+        if len(came) == 1:
+            flight.cancel()
 
     for number in _ENDING:
         loop.add_signal_handler(number, end, number)

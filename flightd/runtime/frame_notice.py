@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TypeVar
+from typing import Annotated, TypeAlias, TypeVar
 
 import msgspec
 
@@ -11,20 +11,30 @@ from flightd.core.errors import InputError
 
 VERSION = 1
 
+_MOST_SLOTS = 1024
+_MOST_PX = 1 << 14
+_INT64 = 1 << 63
+
 _T = TypeVar("_T")
+_Slots: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=_MOST_SLOTS)]
+_Slot: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=_MOST_SLOTS)]
+_Seq: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=_INT64 - 1)]
+_DeviceTime: TypeAlias = Annotated[int, msgspec.Meta(ge=-_INT64, le=_INT64 - 1)]
+_Pixels: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=_MOST_PX)]
 
 
 class FrameNotice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """`device_ns` is mid-exposure in the camera's own clock, `exposure` and `gain` the parts of the camera's
-    usual ones that the frame was taken with; the rest says where the frame is."""
+    usual ones that the frame was taken with; the rest says where the frame is, within bounds: the processes
+    that look there must not die of a number."""
 
     ring: str
-    slots: int
-    slot: int
-    seq: int
-    device_ns: int
-    width_px: int
-    height_px: int
+    slots: _Slots
+    slot: _Slot
+    seq: _Seq
+    device_ns: _DeviceTime
+    width_px: _Pixels
+    height_px: _Pixels
     exposure: float = 1.0
     gain: float = 1.0
     version: int = VERSION

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import queue
 import threading
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -88,7 +89,8 @@ class AuditLog:
     def _write(self, line: bytes) -> None:
         if self._size + len(line) > self._rotate_bytes:
             full = self._fd
-            self._path.replace(self._path.with_name(self._path.name + ".1"))
+            with suppress(FileNotFoundError):  # put aside already, and then no new one could be made
+                self._path.replace(self._path.with_name(self._path.name + ".1"))
             self._open()
             os.close(full)
         self._size += os.write(self._fd, line)

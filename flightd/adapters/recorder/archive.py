@@ -43,18 +43,19 @@ class FlightArchive:
         return [path for _, path in sorted((match[1], path) for match, path in numbered if match)]
 
     def begin(self, started: datetime) -> Path:
-        """Make the folder of a new flight (`started` in UTC) and room for it; returns its log's path."""
+        """Make room for a new flight (`started` in UTC), and its folder; returns its log's path."""
         flights = self.flights()
         newest = _FLIGHT.fullmatch(flights[-1].name) if flights else None
         number = int(newest[1]) + 1 if newest else 1
         folder = self._folder / f"flight-{number:06d}-{started:%Y%m%dT%H%M%SZ}"
+        self._in_progress = None
+        with suppress(OSError):
+            self.make_room()  # first: a full disk has none for a folder either
         try:
             folder.mkdir(parents=True)
         except OSError as err:
             raise UnavailableError(f"{folder}: cannot make the flight's folder: {err.strerror}") from None
         self._in_progress = folder
-        with suppress(OSError):
-            self.make_room()
         return folder / LOG_NAME
 
     async def run(self) -> None:

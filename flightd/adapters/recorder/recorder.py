@@ -46,7 +46,7 @@ RESTART_S = 1.0
 """A writing process that dies at once is started again no sooner than this."""
 
 CLOSE_S = 10.0
-"""How long `close` waits for the writing process to finish the file."""
+"""The most that `close` takes in all, below the stop's time-out of the service."""
 
 _PUSH_BYTES = 16 << 10
 
@@ -224,6 +224,7 @@ class McapRecorder:
         """Hand over everything, wait until the file is finished; idempotent.
 
         Blocks for up to CLOSE_S when the disk is slow; a writer that needs longer goes on by itself."""
+        due_s = time.monotonic() + CLOSE_S
         with self._starting:
             if self._closed:
                 return
@@ -234,16 +235,17 @@ class McapRecorder:
         if self.dropped:
             self._queue += _metadata({"dropped": str(self.dropped)})
         with suppress(OSError):
-            self._link.settimeout(CLOSE_S)
+            self._link.settimeout(_until(due_s))
             self._link.sendall(self._queue[self._sent :])
             self._queue.clear()
             self._link.shutdown(socket.SHUT_WR)
             while answer := self._link.recv(1 << 16):
                 self._answers += answer
+                self._link.settimeout(_until(due_s))
         self._read_answers()
         self._link.close()
         with suppress(subprocess.TimeoutExpired):
-            self._child.wait(CLOSE_S)
+            self._child.wait(_until(due_s))
 
     def __enter__(self) -> Self:
         return self
@@ -353,6 +355,11 @@ class McapRecorder:
             )
             self._watch.begin(time.monotonic())
             self._link = ours
+
+
+def _until(due_s: float) -> float:
+    """What is left until then, by the monotonic clock; never 0, by which a socket would not wait at all."""
+    return max(due_s - time.monotonic(), 0.001)
 
 
 def _frame(kind: Kind, channel: int, stamp_ns: int, payload: bytes) -> bytes:

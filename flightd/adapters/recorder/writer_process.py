@@ -8,7 +8,6 @@ process.
 from __future__ import annotations
 
 import base64
-import os
 import select
 import signal
 import socket
@@ -30,6 +29,7 @@ from flightd.adapters.recorder.writer_protocol import (
     WriterTally,
     take_frames,
 )
+from flightd.runtime.niceness import give_way
 
 FLUSH_S = 1.0
 """The most that a kill of this process loses."""
@@ -139,7 +139,7 @@ def main() -> None:
     """Arguments: the descriptor of the socket, `create` or `resume`, the path of the log."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    os.nice(_NICENESS)
+    give_way(_NICENESS)
     descriptor, how, path = int(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
     with socket.socket(fileno=descriptor) as link:
         serve(link, McapFile.resume(path) if how == "resume" else McapFile.create(path))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from flightd.ports import Clock, Ground
 from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.runtime.latest_slot import Latest
+from flightd.runtime.niceness import give_way
 from flightd.vision.shelf.shelf_look import read_shelf
 
 
@@ -81,7 +81,7 @@ def _shown(bgr: Image) -> bytes:
 
 
 def _shelf_reader() -> Work[Wanted, Reading]:
-    os.nice(_NICE)
+    give_way(_NICE)
     return read_frame
 
 

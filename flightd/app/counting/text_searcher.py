@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import signal
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -16,6 +15,7 @@ from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.label_values import LabelValue
 from flightd.runtime.child_process import Child
 from flightd.runtime.clock import Hold
+from flightd.runtime.niceness import give_way
 from flightd.vision.shelf.text_search import BrokenPictureError, TextSearch, search_name
 
 _MOST_WAITING = 200
@@ -145,7 +145,7 @@ def _in_time(make: Callable[[], Callable[[bytes], Any]], longest_s: float) -> Ca
 
 def _searching(patterns: Sequence[LabelTextConfig]) -> Callable[[bytes], tuple[LabelValue, ...] | None]:
     """What the process does: the values in a picture, None for one that is broken."""
-    os.nice(_NICE)
+    give_way(_NICE)
     search = TextSearch(patterns)
 
     def searched(jpeg: bytes) -> tuple[LabelValue, ...] | None:

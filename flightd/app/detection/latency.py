@@ -27,7 +27,8 @@ class LatencyBook:
         self.newest: dict[str, float] = {}
 
     def taken(self, detection: Detection, now_ns: int) -> None:
-        """The tick at `now_ns` used these lines."""
+        """The tick at `now_ns` used these lines.  Those whose setpoints were never sent are forgotten."""
+        self._waiting = [one for one in self._waiting if now_ns - one[1] <= _SAME_TICK_NS]
         self._waiting.append((detection, now_ns))
 
     def sent(self, now_ns: int) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from flightd.app.detection.detector_pool import Detection, Detectors
 from flightd.app.detection.latency import LatencyBook
 from flightd.app.flight import Tasks
+from flightd.app.record_pace import RecordPace
 from flightd.core.geometry import Lens
 from flightd.core.preview import CameraName, Preview, found_lines
 from flightd.core.topics import Topic
@@ -22,7 +23,8 @@ _RATE_NS = 1_000_000_000
 class DetectionPipeline:
     """`app.flight.Vision`: frames in by `frames`, lines out by `fresh`; `workers` are looked at at once.
 
-    Frames are kept for the recorder at up to `picture_fps` (0: none), for the ground when it asks.
+    Frames are kept for the recorder at up to `picture_fps` (0: none) as its `pace` allows, for the ground
+    when it asks.
     `lens` says where its pictures show the lines, `latency` hears from the pump when a setpoint is on the
     wire."""
 
@@ -34,12 +36,14 @@ class DetectionPipeline:
         ground: Ground,
         picture_fps: float,
         lens: Lens,
+        pace: RecordPace,
     ) -> None:
         self._detectors = detectors
         self._workers = workers
         self._recorder = recorder
         self._ground = ground
         self._lens = lens
+        self._pace = pace
         self._period_ns = round(1e9 / picture_fps) if picture_fps else 0
         self.frames: Latest[FrameTicket] = Latest()
         self.latency = LatencyBook()
@@ -124,4 +128,6 @@ class DetectionPipeline:
         self.latency.forget()
 
     def _is_kept(self, ticket: FrameTicket) -> bool:
-        return bool(self._period_ns) and ticket.stamp_ns - self._picture_ns >= self._period_ns
+        if not self._period_ns or ticket.stamp_ns - self._picture_ns < self._period_ns:
+            return False
+        return self._pace.due(Topic.FRAME, ticket.stamp_ns)

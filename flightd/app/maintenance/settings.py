@@ -8,10 +8,8 @@ starts.  That one runs in a process of its own: however long it takes, the contr
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import hashlib
 import json
-import os
 import sys
 import tomllib
 from collections.abc import Callable, Collection, Mapping
@@ -34,6 +32,7 @@ from flightd.config.edited_text import edited
 from flightd.config.reference import rows, tables
 from flightd.config.remote_change import Value, checked, differences, fixed_because, value_in
 from flightd.core.errors import InputError, RunError, UnavailableError
+from flightd.runtime.niceness import give_way
 from flightd.runtime.within import Within
 from flightd.vision.lines.colour_profile import read_profile
 
@@ -136,8 +135,7 @@ class DroneSettings:
                 stderr=asyncio.subprocess.PIPE,
             )
             try:
-                with contextlib.suppress(OSError):  # the service's own limits may forbid that
-                    os.setpriority(os.PRIO_PROCESS, process.pid, _GENTLY)
+                give_way(_GENTLY, process.pid)
                 async with Within(_CHECK_S):
                     found, said = await process.communicate()
             except TimeoutError:

@@ -324,6 +324,24 @@ def test_each_picture_goes_to_the_camera_it_shows_and_none_during_the_switch() -
     virtual(main())
 
 
+def test_a_camera_that_is_started_again_shows_on() -> None:
+    async def main() -> None:
+        async with bench() as b:
+            taken: list[FrameTicket] = []
+            camera = ArDroneCamera(b.vehicle, 0.0, b.clock, {DroneCamera.DOWN: taken.append}, held)
+            for _ in range(2):
+                task = asyncio.create_task(camera.run())
+                await b.configured()
+                taken.clear()
+                for n in range(60):
+                    await asyncio.sleep(PERIOD_S)
+                    b.server.show(bars(n, (60, 60, 220)))
+                assert len(taken) > 20
+                await ended(task)
+
+    virtual(main())
+
+
 def test_the_front_channel_shows_the_racks_and_the_bottom_one_the_floor() -> None:
     site = load_site(shipped("site-racks-small.toml"))
 

@@ -21,7 +21,7 @@ from flightd.app.flight_orders import configured_order
 from flightd.config.schema import Config, load_config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.snapshot import Snapshot
-from flightd.core.types import Command, CommandKind, Demand, Phase
+from flightd.core.types import Command, CommandKind, Demand, Event, Phase
 from flightd.ports import Monitor
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameTicket
@@ -190,6 +190,52 @@ def test_what_is_not_critical_fails_in_the_air_and_the_flight_is_still_ended_by_
             assert not rig.peer.armed
             assert rig.peer.truth().height_m < 0.15
             assert min(part.started for part in (front, *others)) > 2
+
+    virtual(test())
+
+
+class Order:
+    """A monitor, and a part that takes its time to close: what came when."""
+
+    def __init__(self) -> None:
+        self.came: list[str] = []
+
+    def tell(self, snapshot: Snapshot) -> None:
+        self._note("tick")
+
+    def event(self, event: Event) -> None: ...
+
+    def over(self) -> None:
+        self._note("over")
+
+    async def run(self) -> None:
+        try:
+            await asyncio.sleep(math.inf)
+        finally:
+            self._note("closes")
+
+    def put(self, value: object) -> None: ...
+
+    def _note(self, what: str) -> None:
+        self.came += [what] if what not in self.came[-1:] else []
+
+
+@pytest.mark.parametrize("ends", ["by itself", "by a signal"])
+def test_that_no_tick_follows_is_told_before_anything_is_closed(ends: str) -> None:
+    async def test() -> None:
+        async with ardupilot_rig(patience=PATIENT_COPTER) as rig:
+            await rig.take_off(1.5)
+            await died(rig)
+            config, order = await config_of(rig, camera_gone=False), Order()
+            plan = configured_order(config)
+            built = build(config, SITE, plan, clock=LoopClock(), detectors=NoDetectors(), monitors=[order])
+            flying = asyncio.create_task(Daemon(replace(built, progress=order)).fly())
+            await rig.until(lambda: "tick" in order.came)
+            if ends == "by a signal":
+                flying.cancel()
+            async with Within(120):
+                await asyncio.wait([flying])
+            assert order.came == ["tick", "over", "closes"]
 
     virtual(test())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import socket
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from flightd.adapters.camera.source import parse_source
 from flightd.config.camera import CameraConfig
 from flightd.core.errors import InputError, TransientError, UnavailableError
 from flightd.runtime.clock import LoopClock
-from flightd.runtime.frame_notice import FrameNotice, encode_notice
+from flightd.runtime.frame_notice import FrameNotice, decode_notice, encode_notice
 from flightd.runtime.frame_ring import FrameTicket
 from flightd.runtime.free_ports import free_port
 from tests.rigs.event_loops import real, virtual
@@ -61,6 +62,25 @@ def test_notices_become_tickets_in_our_time_and_junk_is_counted() -> None:
     assert len(troubles) == 1, "told once, not for every datagram"
     assert "not a frame notice" in troubles[0]
     assert all(abs(t.arrival_ns - t.stamp_ns - 50_000_000) < 10_000 for t in tickets)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        *(("slots", value) for value in (-3, 0, 1 << 20, 1 << 70)),
+        *(("slot", value) for value in (-1, 1 << 20)),
+        *(("seq", value) for value in (-1, 1 << 63)),
+        *(("device_ns", value) for value in (1 << 63, -(1 << 64))),
+        *(("width_px", value) for value in (0, -64, 1 << 20)),
+        ("height_px", -36),
+    ],
+)
+def test_a_notice_of_numbers_beyond_any_frame_is_refused(field: str, value: int) -> None:
+    told = {"ring": "flightd-1-x", "slots": 4, "slot": 1, "seq": 1, "device_ns": 1, "width_px": 64}
+    told["height_px"] = 36
+    assert decode_notice(json.dumps(told).encode()).seq == 1
+    with pytest.raises(InputError, match="not a frame notice"):
+        decode_notice(json.dumps(told | {field: value}).encode())
 
 
 @dataclass(frozen=True)

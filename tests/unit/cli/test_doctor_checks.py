@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -43,6 +45,7 @@ from flightd.doctor.written_files import check_written
 from flightd.site.site_file import load_site
 from flightd.tracking.delay_by_tilt import DelayByTilt
 from flightd.vision.line_detector import Detector
+from tests.rigs import denied_calls
 from tests.unit.mission.shelves import FITTED
 from tests.unit.store.test_learnt_sensors import kept
 
@@ -82,12 +85,31 @@ def test_the_processor(change: dict[str, Any], word: str, level: CheckLevel) -> 
     [
         (1e-9, 2026, True, CheckLevel.OK),
         (1e-9, 2026, False, CheckLevel.WARNING),
+        (1e-9, 2026, None, CheckLevel.UNSEEN),
+        (1e-9, 1970, None, CheckLevel.WARNING),
         (1e-9, 1970, True, CheckLevel.WARNING),
         (0.015, 2026, True, CheckLevel.ERROR),
     ],
 )
-def test_the_clock(resolution_s: float, year: int, synchronised: bool, level: CheckLevel) -> None:
+def test_the_clock(resolution_s: float, year: int, synchronised: bool | None, level: CheckLevel) -> None:
     assert levels([judge_clock(resolution_s, year, synchronised=synchronised)]) == [level]
+
+
+@pytest.mark.skipif(not denied_calls.is_known(), reason="no filter for this processor")
+def test_a_clock_that_may_not_be_asked_is_no_complaint() -> None:
+    command = [sys.executable, "-c", _ASKS_THE_CLOCK]
+    told = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).parents[3])
+    assert told.stdout == "unseen whether anything keeps the date right: the clock may not be asked here\n"
+
+
+_ASKS_THE_CLOCK = """
+from flightd.doctor.machine import check_clock
+from tests.rigs.denied_calls import deny
+deny("adjtimex")
+deny("clock_adjtime")
+found = check_clock()
+print(found.level, found.text)
+"""
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -38,6 +41,24 @@ def test_a_full_file_is_put_aside_once(tmp_path: Path) -> None:
     log.close()
     assert path.stat().st_size <= 1000
     assert (tmp_path / "audit.jsonl.1").stat().st_size <= 1000
+    assert "id-19" in path.read_text()
+
+
+def test_a_new_file_that_could_not_be_made_is_made_for_the_next_entry(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "audit.jsonl"
+    log, opened = AuditLog(path, rotate_bytes=1000), os.open
+
+    def refuses_once(*words: Any) -> int:
+        monkeypatch.setattr("os.open", opened)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.open", refuses_once)
+    for number in range(20):
+        log.write(entry(number))
+    log.close()
+    assert log.dropped == 1
     assert "id-19" in path.read_text()
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import shutil
 from datetime import UTC, datetime
 from pathlib import Path
@@ -64,6 +65,28 @@ def test_the_flight_in_progress_is_never_removed(tmp_path: Path) -> None:
     current = _fly(archive, 3 * MEGABYTE)
     archive.make_room()
     assert archive.flights() == [current]
+
+
+def test_a_disk_without_room_for_a_folder_gets_some_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    archive = FlightArchive(tmp_path, 100 * MEGABYTE, reserve_bytes=MEGABYTE)
+    first, second = _fly(archive), _fly(archive)
+    mkdir = Path.mkdir
+
+    def usage(path: Path) -> Usage:
+        return Usage(0, 0, 0 if first.exists() else 2 * MEGABYTE)
+
+    def make(path: Path, *, parents: bool) -> None:
+        if not usage(path).free:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        mkdir(path, parents=parents)
+
+    monkeypatch.setattr(shutil, "disk_usage", usage)
+    monkeypatch.setattr(Path, "mkdir", make)
+    third = archive.begin(STARTED).parent
+    assert archive.flights() == [second, third]
+    assert third.name.startswith("flight-000003-")
 
 
 def test_what_is_not_a_flight_is_never_removed(tmp_path: Path) -> None:

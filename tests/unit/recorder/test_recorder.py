@@ -8,12 +8,14 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from flightd.adapters.recorder import recorder as recorder_module
 from flightd.adapters.recorder.mcap_repair import is_whole
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
 from flightd.adapters.recorder.schemas import schema_of
@@ -479,6 +481,24 @@ def test_run_hands_over_what_waits_without_further_messages(tmp_path: Path) -> N
                 await running
 
     real(fly())
+
+
+@pytest.mark.filterwarnings("ignore:subprocess:ResourceWarning")  # it goes on by itself, as promised
+def test_close_has_one_deadline_for_a_writer_that_stands_still(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_module, "CLOSE_S", 1.5)
+    recorder = McapRecorder(tmp_path / "flight.mcap")
+    recorder.record(Topic.SETPOINT, 0, AttitudeSetpoint(0))
+    os.kill(recorder.pid, signal.SIGSTOP)
+    began_s = time.monotonic()
+    try:
+        recorder.close()
+        assert time.monotonic() - began_s < 2.5
+    finally:
+        os.kill(recorder.pid, signal.SIGCONT)
+    os.waitpid(recorder.pid, 0)
+    assert is_whole(tmp_path / "flight.mcap")
 
 
 def test_close_can_be_called_twice(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 import pytest
 
 from flightd.app.detection.detector_pool import Detection
@@ -13,14 +15,15 @@ FRAME_NS = 33_000_000
 WAY_NS = 80_000_000
 
 
-def fly(book: LatencyBook, seq: int, way_ns: int = WAY_NS) -> int:
+def fly(book: LatencyBook, seq: int, way_ns: int = WAY_NS, *, sends: bool = True) -> int:
     """Fly by frame `seq` of a steady camera, so long after its exposure."""
     stamp_ns = 1_000_000_000 + seq * FRAME_NS
     ticket = FrameTicket("ring", 0, 4, seq, stamp_ns, stamp_ns + 10_000_000, 64, 36)
     lines = LineSet(seq, stamp_ns, 64, 36, (), (), "combined", {})
     now_ns = stamp_ns + way_ns
     book.taken(Detection(ticket, lines, stamp_ns + 12_000_000, stamp_ns + 20_000_000), now_ns)
-    book.sent(now_ns)
+    if sends:
+        book.sent(now_ns)
     return now_ns
 
 
@@ -37,6 +40,15 @@ def test_frames_that_were_dropped_count_until_the_one_that_overtook_them() -> No
     now_ns = fly(book, 10)
     assert book.recent_p99_s(now_ns) == pytest.approx((WAY_NS + 9 * FRAME_NS) * 1e-9)
     assert book.quantiles_ms()["p99"] == pytest.approx(WAY_NS * 1e-6), "that of the frames themselves"
+
+
+def test_setpoints_that_are_made_and_never_sent_leave_nothing_behind() -> None:
+    book = LatencyBook()
+    for seq in range(1000):
+        fly(book, seq, sends=False)
+    kept = sum(isinstance(one, Detection) for one in gc.get_objects())
+    assert kept <= 2, "of the newest tick, and what came right before it"
+    assert book.recent_p99_s(fly(book, 1010)) == pytest.approx(WAY_NS * 1e-9)
 
 
 def test_a_time_without_set_points_is_no_delay() -> None:

@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 import threading
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -101,6 +102,27 @@ def test_a_worker_that_fails_costs_one_picture_and_is_replaced(seq: int, why: st
     assert None not in answers[1:]
     assert pool.lost.total() == 1
     assert why in next(iter(pool.lost))
+
+
+def test_lost_frames_are_counted_by_a_few_reasons() -> None:
+    async def main() -> DetectorPool:
+        ring = FrameRing.create(4, 64, 36)
+        try:
+            with pool_of(1) as pool:
+                await pool.ready()
+                lost = FrameTicket(ring.name, 1, 4, 1, 0, 0, 64, 36)
+                for seq in range(100, 130):
+                    assert await pool.detect(replace(lost, seq=seq)) is None
+                for seq in range(100, 130):
+                    assert await pool.detect(replace(lost, ring=chr(seq))) is None
+                return pool
+        finally:
+            ring.close()
+
+    lost = real(main()).lost
+    assert lost["frame N was overwritten before it was read"] == 30
+    assert lost.total() == 60
+    assert len(lost) <= 21
 
 
 def test_idle_workers_killed_from_outside_are_replaced() -> None:

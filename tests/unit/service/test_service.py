@@ -109,6 +109,38 @@ def settings(unit: Path) -> set[str]:
     return {line for line in unit.read_text().splitlines() if line[:1] not in {"", "#", "["}}
 
 
+def test_a_daemon_that_dies_takes_no_child_with_it() -> None:
+    assert "KillMode=process" in settings(UNIT), "its writer finishes the log, see test_orphans"
+
+
+@pytest.mark.parametrize("unit", [UNIT, GROUND_UNIT], ids=lambda unit: unit.stem)
+def test_what_gives_way_to_the_flight_may_do_so(unit: Path) -> None:
+    allowed = allowed_calls(unit)
+    assert {"getpriority", "setpriority", "prlimit64", "execve"} <= allowed, "what the code calls"
+    assert {"sched_setscheduler", "mount", "reboot", "adjtimex"}.isdisjoint(allowed), "the rest stays"
+
+
+def allowed_calls(unit: Path) -> set[str]:
+    """The system calls that the unit's filter lets through, its lines taken one after the other."""
+    analyze, allowed = tool("systemd-analyze"), set[str]()
+    for line in unit.read_text().splitlines():
+        key, _, names = line.partition("=")
+        if key != "SystemCallFilter":
+            continue
+        calls = {call for name in names.lstrip("~").split() for call in members(analyze, name)}
+        allowed = allowed - calls if names.startswith("~") else allowed | calls
+    return allowed
+
+
+def members(analyze: str, name: str) -> set[str]:
+    """A call, or those of a set and of the sets in it."""
+    if not name.startswith("@"):
+        return {name}
+    listed = subprocess.run([analyze, "syscall-filter", name], capture_output=True, text=True, check=True)
+    lines = (line.strip() for line in listed.stdout.splitlines()[1:])
+    return {call for line in lines if line and not line.startswith("#") for call in members(analyze, line)}
+
+
 @pytest.mark.parametrize(
     ("unit", "user"), [(GROUND_UNIT, "flightd-ground"), (DELIVER_UNIT, "flightd")], ids=["ground", "deliver"]
 )
@@ -117,7 +149,8 @@ def test_what_runs_beside_the_daemon_is_shut_in_as_it_is(unit: Path, user: str) 
         r"(Protect|Private|Restrict|NoNew|Memory(Deny)|Lock|System|Capability|Ambient|Keyring|RemoveIPC|IPA|Device)"
     )
     needed_by_the_drone = {line for line in settings(UNIT) if line.startswith("DeviceAllow=")} | {
-        "RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK"
+        "RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK",
+        "SystemCallFilter=setpriority",
     }
     daemons = {line for line in settings(UNIT) if shutting.match(line)} - needed_by_the_drone
     assert len(daemons) > 25

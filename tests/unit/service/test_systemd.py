@@ -112,6 +112,14 @@ def test_no_watchdog_is_fed_that_is_not_ours(manager: Manager, more: dict[str, s
     assert said(manager.messages(), "STOPPING") == ["1"]
 
 
+def test_that_it_stops_is_said_once_and_before_anything_is_closed(manager: Manager) -> None:
+    monitor = monitor_of(manager)
+    monitor.over()
+    assert said(manager.messages(), "STOPPING") == ["1"]
+    monitor.close()
+    assert manager.messages() == []
+
+
 def test_the_status_is_one_line_for_a_person(manager: Manager) -> None:
     monitor = monitor_of(manager)
     monitor.tell(vitals(reason="lines\nlost"))

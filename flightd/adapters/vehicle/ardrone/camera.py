@@ -64,6 +64,7 @@ class ArDroneCamera:
         finally:
             if self._ring is not None:
                 self._ring.close()
+                self._ring = None  # started again, it needs another
 
     def _show(self, picture: DecodedFrame) -> None:
         since_ns = self._vehicle.camera_since_ns

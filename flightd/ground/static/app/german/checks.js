@@ -117,6 +117,8 @@ export default {
   "nothing keeps the date right": "nichts hält das Datum richtig",
   "run systemd-timesyncd or chrony: logs and signed links need it": "starten Sie systemd-timesyncd oder chrony: Protokolle und signierte Verbindungen brauchen das",
   "monotonic in fine steps, date synchronised": "monoton in feinen Schritten, Datum abgeglichen",
+  "whether anything keeps the date right: the clock may not be asked here": "ob etwas das Datum richtig hält: Die Uhr darf hier nicht gefragt werden",
+  "ask timedatectl: logs and signed links need it": "fragen Sie timedatectl: Protokolle und signierte Verbindungen brauchen das",
   "front_camera.lamp {lamp}: there is no {led}": "front_camera.lamp {lamp}: {led} gibt es nicht",
   "name one of these: {leds}": "nennen Sie eine davon: {leds}",
   "front_camera.lamp {lamp}: {led}/brightness cannot be written": "front_camera.lamp {lamp}: {led}/brightness lässt sich nicht schreiben",

@@ -1,0 +1,36 @@
+"""What a start lacks, and whether the daemon does without it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from flightd.core.errors import FlightdError, InputError, UnavailableError
+
+_LOG = logging.getLogger(__name__)
+
+
+class StartupFaults:
+    """What could not be had.  Where the vehicle may be `in_air` it needs the daemon more than the daemon what
+    it lacks: record, ground, metrics, codes."""
+
+    def __init__(self, *, in_air: bool) -> None:
+        self._in_air = in_air
+        self.first: FlightdError | None = None
+        """The first that is done without: it ends the daemon once its vehicle stands disarmed."""
+
+    @contextmanager
+    def tolerated(self) -> Iterator[None]:
+        """What is opened within may be done without."""
+        try:
+            yield
+        except (InputError, UnavailableError) as err:
+            self.do_without(err)
+
+    def do_without(self, err: FlightdError) -> None:
+        """Go on without a part that cannot be had.  Raises `err` where nothing can be in the air."""
+        if not self._in_air:
+            raise err
+        _LOG.warning("%s; the vehicle may be in the air, it is done without", err)
+        self.first = self.first or err
