@@ -28,7 +28,8 @@ def check_written(config: Config) -> list[Check]:
         for key, path in wanted.items()
         if path is not None and not _may_be_written(path)
     ]
-    return refused or ([ok("files", f"can write {', '.join(wanted)}")] if wanted else [])
+    names = ", ".join(wanted)
+    return refused or ([ok("files", f"can write {names}")] if wanted else [])
 
 
 def _may_be_written(path: Path) -> bool:

@@ -113,7 +113,7 @@ export default {
   "GUIDED needs an estimate of the motion (vehicle.flying_mode)": "GUIDED braucht eine Schätzung der Bewegung (vehicle.flying_mode)",
   "else our motion (vehicle.pose_output) is not heard": "sonst wird unsere Bewegung (vehicle.pose_output) nicht gehört",
   "else the landing target is not heard": "sonst wird das Landeziel nicht gehört",
-  "a threshold for fewer cells is never reached in time, one for more lands at once": "eine Schwelle für weniger Zellen wird nie rechtzeitig erreicht, eine für mehr landet sofort",
+  "above, the autopilot lands in the aisle what could still fly home; below, it acts too late": "darüber landet der Autopilot im Gang, was noch heimfliegen könnte; darunter greift er zu spät",
   "the autopilot's own charge and low-battery landing go by it": "Ladung und Akkulandung des Autopiloten gehen danach",
   "FS_GCS_ENABLE watches the heartbeats of that system, which must be this computer's alone": "FS_GCS_ENABLE achtet auf die Heartbeats dieses Systems, das allein dieser Rechner sein darf",
   "above MAV_GCS_SYSID all systems up to it count as this computer: a ground station would hold off the landing": "über MAV_GCS_SYSID zählen alle Systeme bis dahin als dieser Rechner: Eine Bodenstation hielte die Landung auf",
