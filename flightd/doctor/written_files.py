@@ -8,10 +8,6 @@ from pathlib import Path
 from flightd.config.schema import Config
 from flightd.doctor.check import Check, error, ok
 
-_REMEDY = (
-    "give this user the right to write there, or choose another place (the service's is /var/lib/flightd)"
-)
-
 
 def check_written(config: Config) -> list[Check]:
     """A complaint for each file or folder that is to be written and cannot be; nothing is made here.  The
@@ -24,7 +20,11 @@ def check_written(config: Config) -> list[Check]:
     }
     wanted = {key: path for key, path in wanted.items() if path is not None}
     refused = [
-        error("files", f"{key} {path} cannot be written", _REMEDY)
+        error(
+            "files",
+            f"{key} {path} cannot be written",
+            "give this user the right to write there, or choose another place (a service's: /var/lib/flightd)",
+        )
         for key, path in wanted.items()
         if path is not None and not _may_be_written(path)
     ]

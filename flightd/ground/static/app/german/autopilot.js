@@ -75,7 +75,7 @@ export default {
   "{bits}, without height and heading (bits 1 and 3)": "{bits}, ohne Höhe und Kurs (Bits 1 und 3)",
   "0 (thrust is a climb rate)": "0 (Schub ist eine Steigrate)",
   "8 (raw thrust)": "8 (roher Schub)",
-  "{least} to {most} V for {cells} cells (battery.cells)": "{least} bis {most} V für {cells} Zellen (battery.cells)",
+  "{least} to {most} V for {cells} cells (battery.cells, cell_home_v, cell_land_v)": "{least} bis {most} V für {cells} Zellen (battery.cells, cell_home_v, cell_land_v)",
   // parameters: why
   "the height above the floor comes from it": "die Höhe über dem Boden kommt von ihm",
   "the climb rate shows a range finder that sticks: it must not come from the same one": "die Steigrate verrät einen hängenden Entfernungsmesser: Sie darf nicht vom selben kommen",
