@@ -23,7 +23,7 @@ def check_written(config: Config) -> list[Check]:
         error(
             "files",
             f"{key} {path} cannot be written",
-            "give this user the right to write there, or choose another place (a service's: /var/lib/flightd)",
+            "give this user the right to write there, or another place (of a service: /var/lib/flightd)",
         )
         for key, path in wanted.items()
         if path is not None and not _may_be_written(path)

@@ -133,7 +133,7 @@ export default {
   "recorder.folder {folder} cannot be written: {why}": "recorder.folder {folder} lässt sich nicht schreiben: {why}",
   "{key} {path} cannot be written": "{key} {path} lässt sich nicht schreiben",
   "can write {names}": "kann {names} schreiben",
-  "give this user the right to write there, or choose another place (a service's: /var/lib/flightd)": "geben Sie diesem Benutzer dort das Schreibrecht, oder wählen Sie einen anderen Ort (für den Dienst: /var/lib/flightd)",
+  "give this user the right to write there, or another place (of a service: /var/lib/flightd)": "geben Sie diesem Benutzer dort das Schreibrecht, oder wählen Sie einen anderen Ort (für den Dienst: /var/lib/flightd)",
   "give its owner the right to write, or choose another folder": "geben Sie dem Eigentümer das Schreibrecht, oder wählen Sie einen anderen Ordner",
   "{a}: {b} GB free, {c} GB of them stay free": "{a}: {b} GB frei, davon bleiben {c} GB frei",
   "delete something, or lower recorder.reserve_gb": "löschen Sie etwas, oder senken Sie recorder.reserve_gb",
