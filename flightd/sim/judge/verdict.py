@@ -44,7 +44,7 @@ class JudgedFault:
 
 
 KINDS = {
-    "hit_rack": "the body touched a shelf front, by m",
+    "hit_rack": "the body touched a rack, by m",
     "hit_ceiling": "the body touched the ceiling, by m",
     "hit_keep_out": "the body was in a keep-out, by m",
     "left_leg": f"more than {OFF_LEG_M:g} m, or than shelves leave room, beside the leg that was meant, by m",

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flightd.core.types import AttitudeSetpoint, Event, EventLevel, Phase
+from flightd.sim.judge.clearance import BODY_RADIUS_M, clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import score
+from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.judge.verdict import KINDS, OFF_LEG_M, judged, off_leg_bound_m
 from flightd.sim.plant.kinematics import ArmedChange
+from flightd.site.site_file import load_site
 from flightd.site.ways import KeepOut
 from tests.rigs.flight_evidence import MS, SITE, S, at, evidence, landed, status
 
@@ -128,6 +133,28 @@ def test_the_body_is_measured_with_its_propellers() -> None:
     assert kinds(evidence([at(0, y_m=0.95)], [status(0)]))["hit_rack"] == pytest.approx(0.05)
     assert "hit_rack" not in kinds(evidence([at(0, y_m=0.95, height_m=3.2)], [status(0)]))
     assert score(evidence([at(0, y_m=1.2, height_m=3.4)], [status(0)])).min_clearance_m == pytest.approx(0.3)
+
+
+RACKS = load_site(Path(__file__).parents[3] / "configs" / "site-racks.toml")
+
+
+@pytest.mark.parametrize(("x_m", "free_m"), [(0.3, 0.0), (0.5, -0.2), (0.8, -BODY_RADIUS_M)])
+def test_beside_a_cross_way_stand_the_ends_of_racks(x_m: float, free_m: float) -> None:
+    """On the way from A1 to B1, between the fronts at y 1.2 and 2.2, which begin 0.6 m beside it."""
+    flight = replace(evidence([at(0, x_m, 1.7, 1.5)], [status(0)]), site=RACKS)
+    assert score(flight).min_clearance_m == pytest.approx(free_m)
+    assert kinds(flight).get("hit_rack", 0.0) == pytest.approx(-free_m)
+
+
+def test_the_nearest_rack_of_a_large_hall_is_the_nearest_of_all() -> None:
+    """A flight of 20 minutes over the whole hall, at each sample held against each rack alone."""
+    n = np.arange(6000)
+    x_m, y_m = 5.0 + 5.5 * np.sin(n / 150), 31.0 * n / len(n)
+    flown = TrueMotion(n / 5.0, x_m, y_m, 1.5 + 2.0 * np.sin(n / 400), np.zeros(len(n)))
+    alone = [clearances(replace(RACKS, shelves=(shelf,)), flown)[1].free_m for shelf in RACKS.shelves]
+    ceiling, racks = clearances(RACKS, flown)
+    assert (ceiling.obstacle, racks.obstacle) == ("ceiling", "rack")
+    assert racks.free_m == pytest.approx(np.min(alone, axis=0))
 
 
 def test_the_ceiling_and_a_keep_out_are_hit_by_the_body_not_its_centre() -> None:
