@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from flightd.site.floor_plan_svg import draw_site
 from flightd.site.layout import CROSS_CLEARANCE_M, lay_out
 from flightd.site.rack_depth import RACK_DEPTH_M, rack_body
 from flightd.site.site import Aisle, Pad, Side, Site
@@ -44,3 +45,10 @@ def test_back_to_back_it_ends_at_the_other_front() -> None:
 def test_the_line_behind_it_keeps_its_way() -> None:
     found = depths_m(two_aisles(2.4, only_a=True))
     assert found["A", Side.RIGHT] == pytest.approx(2.4 - 1.2 - CROSS_CLEARANCE_M)
+
+
+def test_a_plan_draws_racks_back_to_back_up_to_each_other() -> None:
+    """64 units a metre; without an outline between them."""
+    plan = draw_site(two_aisles(3.0, only_a=False))
+    assert plan.count('height="38.4"/>') == 4
+    assert plan.index('class="shelf"') > plan.rindex('class="rack"')
