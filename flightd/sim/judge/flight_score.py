@@ -75,7 +75,7 @@ def score(flight: FlightEvidence) -> FlightScore:
         mission="completed" if final and final.phase is Phase.DONE else "aborted",
         reason=final.reason if final else "the daemon never spoke",
         nodes_planned=flight.plan.nodes,
-        nodes_visited=len({visit.text for visit in visits}),
+        nodes_visited=len(flight.plan.to_visit & {visit.text for visit in visits}),
         nodes_miscounted=len(visits) - len(right),
         cross_track_rms_m=_rounded(math.sqrt(float(np.mean(off**2))) if len(off) else None),
         cross_track_max_m=_rounded(float(off.max()) if len(off) else None),

@@ -61,6 +61,7 @@ KINDS = {
     "off_pad": f"landed more than {_OFF_PAD_M:g} m beside the pad's centre, m",
     "codes_wrong": "codes in the inventory that are not on the shelf",
     "empty_wrong": "places called empty that are not",
+    "unanswered": "planned places of which a completed mission has no look that counts",
     "not_found": "the scenario's hazard was not found",
     "found_late": "the hazard was found later than the scenario allows, s",
     "other_action": "the daemon did not do what the table of hazards says",
@@ -69,7 +70,7 @@ KINDS = {
 }
 """What each kind of fault says, with its value."""
 
-MISSION_KINDS = frozenset({"aborted", "not_visited", "off_pad"})
+MISSION_KINDS = frozenset({"aborted", "not_visited", "off_pad", "unanswered"})
 """What is no fault where a scenario asks for another end than a completed mission."""
 SAFETY_KINDS = frozenset(
     {
@@ -90,9 +91,15 @@ _ASKS_FOR_LANDING = tuple(f": {action.value}" for action in (Action.LAND, Action
 
 
 def judged(
-    flight: FlightEvidence, score: FlightScore, *, codes_wrong: int = 0, empty_wrong: int = 0
+    flight: FlightEvidence,
+    score: FlightScore,
+    *,
+    codes_wrong: int = 0,
+    empty_wrong: int = 0,
+    not_looked_at: int = 0,
 ) -> list[JudgedFault]:
-    """All faults of a flight, in the order of `KINDS`."""
+    """All faults of a flight, in the order of `KINDS`.  `not_looked_at`: places that were to be counted,
+    and of which it is not even known that they are unreadable or covered."""
     end_s = float(flight.truth[-1].stamp_ns * 1e-9) - flight.begun_s if flight.truth else 0.0
     counts = {
         "record_lost": flight.lost,
@@ -102,8 +109,9 @@ def judged(
     }
     if score.mission != "completed":
         counts["aborted"] = max(score.nodes_planned - score.nodes_visited, 1)
-    elif score.nodes_visited < score.nodes_planned:
+    else:
         counts["not_visited"] = score.nodes_planned - score.nodes_visited
+        counts["unanswered"] = not_looked_at
     found = [JudgedFault(kind, _finite(end_s), float(count)) for kind, count in counts.items() if count]
     if len(flight.in_air):
         found += [*_in_the_air(flight), *_at_the_floor(flight)]

@@ -236,6 +236,23 @@ def test_counts_that_are_wrong_are_bad_and_a_flight_without_fault_is_good() -> N
     assert kinds(replace(good, lost=3)) == {"record_lost": 3.0}
 
 
+def test_a_completed_mission_answers_for_each_place_and_another_end_for_none() -> None:
+    visited = Event(4 * S, EventLevel.INFO, "visited", "A2")
+    flown, statuses = landed(at(S, 0.0), at(4 * S, 1.5), at(7 * S, 0.0)), [status(0, node="A1", goal="A2")]
+    for phase, told in ((Phase.DONE, {"unanswered": 3.0}), (Phase.ABORTED, {"aborted": 1.0})):
+        flight = evidence(flown, [*statuses, replace(DONE, phase=phase)], [visited])
+        found = judged(flight, score(flight), not_looked_at=3)
+        assert {fault.kind: fault.value for fault in found} == told
+
+
+def test_a_node_that_was_not_planned_stands_for_none_that_was() -> None:
+    visited = Event(4 * S, EventLevel.INFO, "visited", "A1")
+    statuses = [status(0, node="A1", goal="A2"), DONE]
+    flown = evidence(landed(at(S, 0.0), at(4 * S, 0.0), at(7 * S, 0.0)), statuses, [visited])
+    assert score(flown).nodes_visited == 0
+    assert kinds(flown)["not_visited"] == 1.0
+
+
 @pytest.mark.parametrize(("x_m", "miscounted"), [(0.95, 0.0), (2.1, 0.0), (2.3, 1.0), (2.7, 1.0)])
 def test_a_node_is_visited_rightly_from_aside_while_no_other_is_nearer(x_m: float, miscounted: float) -> None:
     visited = Event(4 * S, EventLevel.INFO, "visited", "A2")

@@ -8,11 +8,14 @@ from pathlib import Path
 import pytest
 
 from flightd.adapters.recorder.recorder import McapRecorder, wait_for_disk
+from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.prepare import SimOptions, prepare
 from flightd.app.simulation.simulation import Simulation
+from flightd.config.paths import shipped
+from flightd.core.inventory import LocationState, Observation, PlannedLocation
 from flightd.core.topics import Topic
-from flightd.core.types import AttitudeSetpoint
+from flightd.core.types import AttitudeSetpoint, Phase
 from flightd.sim.scenario.faults import FaultNote
 from flightd.sim.scenario.scenario import Scenario
 from tests.rigs.flight_evidence import S, at, status
@@ -41,6 +44,29 @@ def faults(simulation: Simulation, kind: str, ended_s: int | None = None) -> set
             roll_rad = math.radians(10.0) if stamp_ns > DOWN_S * S else 0.0
             log.record(Topic.SETPOINT, stamp_ns, AttitudeSetpoint(stamp_ns, roll_rad))
     return {fault.kind for fault in judge_flight(simulation).faults}
+
+
+def test_each_place_is_answered_by_a_look_that_counts_unreadable_or_not(tmp_path: Path) -> None:
+    """Of 48 places one is told to be empty, two as nothing that anybody can say, one by a look that is not
+    proven and one by one that was withdrawn."""
+    options = SimOptions(warehouse=str(shipped("site-racks-small.toml")))
+    simulation = prepare(options, Scenario(), tmp_path, lambda _: None)
+    places = list(simulation.site.locations.values())
+    states = [LocationState.EMPTY, LocationState.UNREADABLE, LocationState.OCCLUDED] + [
+        LocationState.EMPTY
+    ] * 2
+    looks = [Observation("run", p.code, 1, state, 0.9) for p, state in zip(places, states, strict=False)]
+    with SqliteStore(simulation.folder) as store:
+        store.plan(PlannedLocation(place.code, place.node) for place in places)
+        for look in looks:
+            store.commit(look, confirmed=look in looks[:3])
+        store.settle("run", [looks[4].location], confirmed=False)
+    with McapRecorder(simulation.truth_log, when_full=wait_for_disk) as log:
+        log.record(Topic.TRUTH, 0, at(0, 0.0, height_m=0.1))
+    with McapRecorder(simulation.flight_log, when_full=wait_for_disk) as log:
+        log.record(Topic.STATUS, 0, status(0, Phase.DONE))
+    found = {fault.kind: fault.value for fault in judge_flight(simulation).faults}
+    assert found["unanswered"] == 48 - 3
 
 
 def test_what_a_dead_computer_would_have_sent_neither_steers_nor_leans(simulation: Simulation) -> None:

@@ -45,6 +45,7 @@ export default {
   "off pad": "neben dem Landeplatz",
   "codes wrong": "falsche Codes",
   "empty wrong": "fälschlich leer",
+  "places unanswered": "Plätze ohne Antwort",
   "not found": "nicht erkannt",
   "found late": "spät erkannt",
   "other action": "andere Reaktion",
