@@ -15,6 +15,8 @@ Values = NDArray[np.float64]
 
 OFF_FLOOR_M = 0.3
 """A body origin higher than this flies; standing it is 0.1 m above the floor."""
+GAP_S = 0.5
+"""True places further apart in time leave half a metre or more of a flight that nobody judges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,12 @@ class TrueMotion:
     def chosen(self, wanted: NDArray[np.bool_]) -> TrueMotion:
         """Only the samples where `wanted` (n,) holds."""
         return TrueMotion(*(getattr(self, field.name)[wanted] for field in fields(self)))
+
+    @property
+    def gaps(self) -> int:
+        """How often there is nothing known for too long between two samples, one of them off the floor."""
+        flies = self.flying
+        return int(((np.diff(self.stamp_s) > GAP_S) & (flies[1:] | flies[:-1])).sum())
 
     @property
     def flying(self) -> NDArray[np.bool_]:

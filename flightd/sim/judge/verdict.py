@@ -12,7 +12,7 @@ from flightd.mission.safety.hazard_table import Action
 from flightd.sim.judge.clearance import BODY_RADIUS_M, clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, longest_uncontrolled, off_leg_in_air, overshoot
-from flightd.sim.judge.motion import OFF_FLOOR_M
+from flightd.sim.judge.motion import GAP_S, OFF_FLOOR_M
 from flightd.site.site import Site
 
 OFF_LEG_M = 0.9
@@ -55,6 +55,7 @@ KINDS = {
     "stayed_up": "in the air at the end, m above the floor",
     "stayed_armed": f"armed on the floor for more than {_STAYS_ARMED_S:g} s, or at the end, s",
     "record_lost": "messages that the flight log did not take, or its end, number",
+    "truth_lost": f"what the log of the truth lacks, and gaps of more than {GAP_S:g} s in the air, number",
     "aborted": "the mission was not completed, nodes left",
     "miscounted": "nodes visited that were others",
     "not_visited": "planned nodes that a completed mission left out",
@@ -84,9 +85,10 @@ SAFETY_KINDS = frozenset(
         "stayed_up",
         "stayed_armed",
         "down_late",
+        "truth_lost",
     }
 )
-"""What must never be, whatever goes wrong."""
+"""What must never be, whatever goes wrong; and without the truth nobody knows of it."""
 _ASKS_FOR_LANDING = tuple(f": {action.value}" for action in (Action.LAND, Action.STOP))
 
 
@@ -103,6 +105,7 @@ def judged(
     end_s = float(flight.truth[-1].stamp_ns * 1e-9) - flight.begun_s if flight.truth else 0.0
     counts = {
         "record_lost": flight.lost,
+        "truth_lost": flight.truth_lost,
         "miscounted": score.nodes_miscounted,
         "codes_wrong": codes_wrong,
         "empty_wrong": empty_wrong,

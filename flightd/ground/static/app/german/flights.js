@@ -40,6 +40,8 @@ export default {
   "leaned on floor": "am Boden geneigt",
   "stayed up": "oben geblieben",
   "stayed armed": "scharf geblieben",
+  "record lost": "Aufzeichnung verloren",
+  "truth lost": "wahrer Flug nicht bekannt",
   "miscounted": "verzählt",
   "not visited": "nicht besucht",
   "off pad": "neben dem Landeplatz",
