@@ -23,6 +23,9 @@ from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.judge.verdict import JudgedFault, judged
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
 
+_UNHEARD = frozenset({"companion_dead", "uplink_silent"})
+"""Faults during which the autopilot hears no setpoint."""
+
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
@@ -50,7 +53,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
     armed = [ArmedChange(**row) for row in _rows(world, Topic.ARMED, ArmedChange)]
     notes = [e.message for e in world.entries if e.topic == Topic.FAULT and isinstance(e.message, dict)]
     begun = [note for note in notes if note["began"]]
-    dead = _lasted([note for note in notes if note["kind"] == "companion_dead"])
+    unheard = _lasted([note for note in notes if note["kind"] in _UNHEARD])
     statuses = flown.messages(Status)
     evidence = FlightEvidence(
         site=simulation.painted_site,
@@ -58,11 +61,11 @@ def judge_flight(simulation: Simulation) -> Judgement:
         statuses=statuses,
         events=flown.messages(Event),
         truth=truth,
-        # what a computer that is dead would have sent reaches nobody
+        # what reaches nobody steers nobody
         setpoints=[
             sent
             for sent in flown.messages(AttitudeSetpoint)
-            if not any(since_ns <= sent.stamp_ns < until_ns for since_ns, until_ns in dead)
+            if not any(since_ns <= sent.stamp_ns < until_ns for since_ns, until_ns in unheard)
         ],
         armed=armed or None,
         piloted_ns=_piloted_ns(simulation, begun),

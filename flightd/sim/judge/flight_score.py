@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightd.core.types import Event, EventLevel, Phase
 from flightd.sim.judge.clearance import clearances
@@ -31,8 +32,9 @@ _LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
 """An event of this phase is a warning where the landing is not the plan's."""
 _CONTROL_GAP_S = 0.5
 """Setpoints further apart leave the drone to itself."""
-_SINKING_MPS = -0.1
-"""Who sinks like this is being landed by its autopilot."""
+_SUNK_M, _SINKS_S = 0.1, 1.0
+"""Who is lower by so much than it ever was until so long ago, since nobody steers it, is being landed by
+its autopilot; who bobs or sags is not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,13 +126,29 @@ def longest_uncontrolled(flight: FlightEvidence) -> tuple[float, float]:
         return math.inf, 0.0
     before = np.searchsorted(sent, motion.stamp_s, side="right")
     age_s = motion.stamp_s - np.r_[-math.inf, sent][before]
-    alone = (age_s > _CONTROL_GAP_S) & (motion.climb_mps > _SINKING_MPS)
+    alone = age_s > _CONTROL_GAP_S
+    alone &= ~_sinks(motion, alone)
     longest, since = (math.inf, 0.0), math.inf
     for stamp_s, is_alone in zip(motion.stamp_s, alone, strict=True):
         since = min(since, stamp_s) if is_alone else math.inf
         if stamp_s - since > longest[1]:
             longest = (float(since), float(stamp_s - since))
     return longest
+
+
+def _sinks(motion: TrueMotion, alone: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """At which samples, (n,), of those where the drone is `alone` its autopilot lands it."""
+    sinks = np.zeros(len(motion), np.bool_)
+    least_m, seen = math.inf, 0
+    for number in range(len(motion)):
+        if not alone[number]:
+            least_m, seen = math.inf, number + 1
+            continue
+        while motion.stamp_s[seen] <= motion.stamp_s[number] - _SINKS_S:
+            least_m = min(least_m, float(motion.height_m[seen]))
+            seen += 1
+        sinks[number] = math.isfinite(least_m) and motion.height_m[number] < least_m - _SUNK_M
+    return sinks
 
 
 def _landed_error_m(flight: FlightEvidence) -> float | None:

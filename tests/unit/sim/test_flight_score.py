@@ -182,8 +182,26 @@ def test_a_drone_left_to_itself_in_the_air_is_out_of_control_unless_it_is_landin
     truth = [at(stamp * 100 * MS) for stamp in range(200)]
     sent = [AttitudeSetpoint(stamp * 20 * MS) for stamp in range(100)]
     assert kinds(evidence(truth, [status(0)], setpoints=sent))["out_of_control"] > 10.0
-    sinking = [replace(t, climb_mps=-0.2) for t in truth]
+    sinking = [replace(t, height_m=5.0 - 0.2 * t.stamp_ns / S) for t in truth]
     assert "out_of_control" not in kinds(evidence(sinking, [status(0)], setpoints=sent))
+
+
+@pytest.mark.parametrize("period_s", [0.5, 2.0, 7.0])
+def test_a_drone_left_to_itself_that_bobs_is_not_landing(period_s: float) -> None:
+    """It falls by up to 0.5 m time and again, and sags by 1 cm/s, but comes back."""
+    sent = [AttitudeSetpoint(stamp * 20 * MS) for stamp in range(100)]
+    turn = math.tau / period_s
+    truth = [
+        at(
+            stamp * 50 * MS,
+            height_m=2.0 + 0.25 * math.cos(turn * stamp / 20) - stamp / 2000,
+            climb=-0.25 * turn * math.sin(turn * stamp / 20),
+        )
+        for stamp in range(500)
+    ]
+    alone_s = score(evidence(truth, [status(0)], setpoints=sent)).uncontrolled_s
+    assert alone_s is not None
+    assert alone_s > 15.0
 
 
 @pytest.mark.parametrize(

@@ -77,8 +77,9 @@ def test_each_place_is_answered_by_a_look_that_counts_unreadable_or_not(tmp_path
     assert found["unanswered"] == 48 - 3
 
 
-def test_what_a_dead_computer_would_have_sent_neither_steers_nor_leans(simulation: Simulation) -> None:
-    found = faults(simulation, "companion_dead")
+@pytest.mark.parametrize("kind", ["companion_dead", "uplink_silent"])
+def test_what_reaches_no_autopilot_neither_steers_nor_leans(simulation: Simulation, kind: str) -> None:
+    found = faults(simulation, kind)
     assert "out_of_control" in found
     assert "leaned_on_floor" not in found
 
