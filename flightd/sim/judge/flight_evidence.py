@@ -59,6 +59,17 @@ class FlightEvidence:
         """When it first left the floor; infinite if it never did."""
         return float(self.in_air.stamp_s[0]) if len(self.in_air) else math.inf
 
+    def armed_s(self) -> list[tuple[float, float]]:
+        """From when to when, s of the clock, it was armed; infinite where it stays so.  Empty where the
+        vehicle does not tell."""
+        changes = self.armed or ()
+        ends_s = [*(change.stamp_ns * 1e-9 for change in changes[1:]), math.inf]
+        return [
+            (change.stamp_ns * 1e-9, end_s)
+            for change, end_s in zip(changes, ends_s, strict=False)
+            if change.armed
+        ]
+
     @property
     def landed(self) -> Kinematics | None:
         """Where it stands at the end, None where it does not, or never flew."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Self
 
@@ -46,6 +46,13 @@ class TrueMotion:
         """How often there is nothing known for too long between two samples, one of them off the floor."""
         flies = self.flying
         return int(((np.diff(self.stamp_s) > GAP_S) & (flies[1:] | flies[:-1])).sum())
+
+    def on_floor_s(self) -> Iterator[tuple[float, float]]:
+        """From when to when, s of the clock, it was on the floor: until it is off it again, or to the end."""
+        flies = self.flying
+        for begin in np.flatnonzero(~flies & np.r_[True, flies[:-1]]):
+            off = np.flatnonzero(flies[begin:])
+            yield float(self.stamp_s[begin]), float(self.stamp_s[begin + off[0] if len(off) else -1])
 
     @property
     def flying(self) -> NDArray[np.bool_]:

@@ -164,6 +164,7 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
         at_s = float(motion.stamp_s[touching[int(np.argmax(sink_mps))]]) - begun_s
         yield JudgedFault("hard_landing", round(at_s, 2), round(float(sink_mps.max()), 2))
     yield from _leaning(flight)
+    yield from _staying_armed(flight)
     if flight.handed_over:
         return
     asked = [
@@ -176,12 +177,21 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
     end_s = last.stamp_ns * 1e-9
     if last.height_m > OFF_FLOOR_M:
         yield JudgedFault("stayed_up", round(end_s - begun_s, 2), round(last.height_m, 2))
-    elif flight.armed is not None and len(touched):
-        down_s = float(motion.stamp_s[touched[-1] + 1])
-        disarmed = [c.stamp_ns * 1e-9 for c in flight.armed if not c.armed and c.stamp_ns * 1e-9 >= down_s]
-        armed_s = (disarmed[0] if disarmed else end_s) - down_s
-        if not disarmed or armed_s > _STAYS_ARMED_S:
-            yield JudgedFault("stayed_armed", round(down_s - begun_s, 2), round(armed_s, 2))
+
+
+def _staying_armed(flight: FlightEvidence) -> Iterator[JudgedFault]:
+    """Before each take-off and after each landing; what is armed when a pilot takes over is his."""
+    end_s = math.inf if flight.handed_over else float(flight.motion.stamp_s[-1])
+    wrong = []
+    for down_s, up_s in flight.motion.on_floor_s():
+        for since_s, until_s in flight.armed_s():
+            first_s, last_s = max(down_s, since_s), min(up_s, until_s)
+            if last_s - first_s > _STAYS_ARMED_S or first_s <= last_s == end_s:
+                wrong.append((first_s, last_s - first_s))
+    if wrong:
+        yield JudgedFault(
+            "stayed_armed", round(wrong[0][0] - flight.begun_s, 2), round(max(s for _, s in wrong), 2)
+        )
 
 
 def _leaning(flight: FlightEvidence) -> Iterator[JudgedFault]:

@@ -227,6 +227,36 @@ def test_armed_on_the_floor_for_long_and_in_the_air_at_the_end_are_bad() -> None
     assert kinds(evidence([at(0), at(S)], [DONE]))["stayed_up"] == pytest.approx(1.6)
 
 
+@pytest.mark.parametrize(
+    ("armed_s", "worst_s"),
+    [
+        ([(9.0, 48.0), (60.0, 108.0)], None),
+        ([(0.0, 110.0)], 20.0),
+        ([(0.0, 44.0), (60.0, 110.0)], None),
+        ([(9.0, 60.0), (61.0, 110.0)], 16.0),
+        ([(9.0, 46.0), (47.0, 108.0)], 17.0),
+        ([(9.0, 48.0), (64.0, 200.0)], 16.0),
+    ],
+    ids=["soon", "never disarmed", "a while before", "at the swap", "before it flies on", "at the end"],
+)
+def test_armed_for_long_on_any_floor_is_bad(
+    armed_s: list[tuple[float, float]], worst_s: float | None
+) -> None:
+    """It flies from 10 to 44 s, has its battery changed until 64 s (or is flown on), and flies to 104 s."""
+    flies = [(10.0, 44.0), (64.0, 104.0)]
+    truth = [
+        at(n * S, 0.0, height_m=1.6 if any(up_s <= n < down_s for up_s, down_s in flies) else 0.1)
+        for n in range(121)
+    ]
+    armed = [
+        ArmedChange(round(stamp_s * S), armed=on)
+        for since_s, until_s in armed_s
+        for stamp_s, on in ((since_s, True), (until_s, False))
+    ]
+    found = kinds(evidence(truth, [status(0), status(110 * S, Phase.DONE)], armed=armed))
+    assert found.get("stayed_armed") == (None if worst_s is None else pytest.approx(worst_s))
+
+
 def test_a_hard_touch_down_is_bad() -> None:
     truth = [at(S, 0.0, climb=-2.0), at(2 * S, 0.0, height_m=0.1)]
     assert kinds(evidence(truth, [DONE]))["hard_landing"] == pytest.approx(2.0)
