@@ -98,8 +98,9 @@ def _found_s(row: Hazard, events: Sequence[Event], first_ns: int, from_ns: int) 
     """None where it was not told since `first_ns`."""
     if row.trigger is None:
         return None
+    told = f"{row.trigger.value}: "  # what is done follows; other hazards' texts begin like this one's
     for event in events:
-        if event.name == "hazard" and event.stamp_ns >= first_ns and event.text.startswith(row.trigger.value):
+        if event.name == "hazard" and event.stamp_ns >= first_ns and event.text.startswith(told):
             return max(0.0, (event.stamp_ns - from_ns) * 1e-9)
     return None
 
