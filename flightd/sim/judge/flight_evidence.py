@@ -11,7 +11,7 @@ from functools import cached_property
 from flightd.core.types import AttitudeSetpoint, Event, Phase, Status
 from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.sim.judge.motion import TrueMotion
-from flightd.sim.plant.kinematics import ArmedChange, Kinematics
+from flightd.sim.plant.kinematics import ON_FLOOR_M, ArmedChange, Kinematics
 from flightd.site.site import Site
 
 
@@ -73,7 +73,7 @@ class FlightEvidence:
     @property
     def landed(self) -> Kinematics | None:
         """Where it stands at the end, None where it does not, or never flew."""
-        down = len(self.in_air) and self.truth[-1].height_m <= _ON_FLOOR_M
+        down = len(self.in_air) and self.truth[-1].height_m <= ON_FLOOR_M
         return self.truth[-1] if down else None
 
     def truth_at(self, stamp_ns: int) -> Kinematics | None:
@@ -85,6 +85,3 @@ class FlightEvidence:
         """The phase that the daemon said to be in."""
         index = bisect_left(self.statuses, stamp_ns, key=lambda status: status.stamp_ns) - 1
         return self.statuses[index].phase if index >= 0 else Phase.PREFLIGHT
-
-
-_ON_FLOOR_M = 0.2

@@ -21,7 +21,8 @@ from flightd.sim.judge.clearance import clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.hover_error import hover_errors
 from flightd.sim.judge.meant_leg import off_leg
-from flightd.sim.judge.motion import OFF_FLOOR_M, TrueMotion, Values
+from flightd.sim.judge.motion import TrueMotion, Values
+from flightd.sim.plant.kinematics import OFF_FLOOR_M
 
 _AT_NODE_M = 0.5
 """A node counts as visited rightly when the drone was within this of it (less than half a cell)."""

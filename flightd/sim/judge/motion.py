@@ -9,12 +9,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.kinematics import OFF_FLOOR_M, Kinematics
 
 Values = NDArray[np.float64]
 
-OFF_FLOOR_M = 0.3
-"""A body origin higher than this flies; standing it is 0.1 m above the floor."""
 GAP_S = 0.5
 """True places further apart in time leave half a metre or more of a flight that nobody judges."""
 

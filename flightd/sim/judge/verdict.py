@@ -12,7 +12,8 @@ from flightd.mission.safety.hazard_table import Action
 from flightd.sim.judge.clearance import BODY_RADIUS_M, clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, longest_uncontrolled, off_leg_in_air, overshoot
-from flightd.sim.judge.motion import GAP_S, OFF_FLOOR_M
+from flightd.sim.judge.motion import GAP_S
+from flightd.sim.plant.kinematics import OFF_FLOOR_M
 from flightd.site.site import Site
 
 OFF_LEG_M = 0.9
