@@ -26,7 +26,8 @@ def export_csv(log: FlightLog, folder: Path) -> list[Path]:
 
     Columns are the fields by name, those inside others joined by a dot; `t_s` counts from the first
     message.  A line set has a row for each line and one with empty columns where nothing was seen.
-    Pictures are left out.  Texts are inert cells (`core.csv_text`).
+    Pictures are left out.  Texts, the names of a foreign log's fields too, are inert cells
+    (`core.csv_text`).
     """
     start_ns = min((entry.stamp_ns for entry in log.entries if not _is_document(entry)), default=0)
     by_topic: dict[str, list[Entry]] = {}
@@ -56,7 +57,7 @@ def _write_topic(folder: Path, topic: str, entries: list[Entry], start_ns: int) 
     columns = list(dict.fromkeys(column for row in rows for column in row))
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, columns)
-        writer.writeheader()
+        writer.writerow({column: inert(column) for column in columns})
         writer.writerows(rows)
     return path
 

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
-from flightd.site.site import Edge, LineColour, Marker, Node, PaintedLine, Shelf, Side, Site
+from flightd.site.rack_depth import RACK_DEPTH_M, rack_body
+from flightd.site.site import Edge, LineColour, Marker, Node, PaintedLine, Site
 
 _PX_PER_M = 64.0
 _MARGIN_M = 1.1
 _HEADER_M = 0.9
-_SHELF_DEPTH_M = 0.8
 _MIN_WIDTH_M = 6.0
 _PAINT: dict[str, str] = {
     LineColour.YELLOW: "#f2bd1d",
@@ -32,7 +32,8 @@ _STYLE = """
   .title { font-size: 22px; font-weight: 650 } .fact { font-size: 13px; fill: #6b737c }
   .node { font-size: 12px; font-weight: 600 } .step { font-size: 10.5px; fill: #7a828b }
   .aisle { font-size: 20px; font-weight: 700; fill: #8b939c }
-  .shelf { fill: url(#rack); stroke: #8d98a5; stroke-width: 1 } .front { stroke: #56626f; stroke-width: 2.5 }
+  .rack { stroke: #8d98a5; stroke-width: 2 } .shelf { fill: url(#rack) }
+  .front { stroke: #56626f; stroke-width: 2.5 }
   .pad { fill: #3c4046; stroke: #1f2225 } .dot { fill: #fff; stroke: #2b3036; stroke-width: 1.8 }
   .shut { stroke: #c0322f; stroke-width: 4; fill: none } .way { fill: #2b3036 }
   .keep { fill: #c0322f; fill-opacity: 0.18; stroke: #c0322f; stroke-width: 1.5; stroke-dasharray: 6 4 }
@@ -63,7 +64,7 @@ class _Plan:
     def __init__(self, site: Site, off: Sequence[LineOff]) -> None:
         self._site, self._off = site, off
         x0, y0, x1, y1 = site.bounds()
-        depth = _SHELF_DEPTH_M if site.shelves else 0.0
+        depth = RACK_DEPTH_M if site.shelves else 0.0
         self._x0_m, self._y0_m = x0 - _MARGIN_M, y0 - depth - 0.3 - _HEADER_M
         self._width = max(x1 - x0 + 2 * _MARGIN_M, _MIN_WIDTH_M) * _PX_PER_M
         self._height = (y1 - self._y0_m + depth + 0.9) * _PX_PER_M
@@ -81,7 +82,7 @@ class _Plan:
             '<path d="M0 0V9" stroke="#c7cfd8" stroke-width="3"/></pattern></defs>',
             '<rect width="100%" height="100%" fill="#f3f4f1"/>',
             *self._header(),
-            *itertools.chain.from_iterable(self._shelf(shelf) for shelf in site.shelves),
+            *self._shelves(),
             *self._pads(),
             *self._lines(),
             *self._markers(),
@@ -115,21 +116,19 @@ class _Plan:
             f'<text class="fact" x="24" y="59">{escape("  ·  ".join(facts))}</text>',
         ]
 
-    def _shelf(self, shelf: Shelf) -> list[str]:
-        outward = -1.0 if shelf.side is Side.LEFT else 1.0
-        gaps = [
-            (other.y_m - shelf.y_m) * outward / 2
-            for other in self._site.shelves
-            if (other.y_m - shelf.y_m) * outward > 0 and other.side is not shelf.side
-        ]
-        depth = min([_SHELF_DEPTH_M, *gaps])
-        left, front = self._at(shelf.x0_m, shelf.y_m)
-        right, back = self._at(shelf.x1_m, shelf.y_m + outward * depth)
-        return [
-            f'<rect class="shelf" x="{left:.1f}" y="{min(front, back):.1f}" width="{right - left:.1f}" '
-            f'height="{abs(back - front):.1f}"/>',
-            f'<path class="front" d="M{left:.1f} {front:.1f}H{right:.1f}"/>',
-        ]
+    def _shelves(self) -> list[str]:
+        """All outlines below all racks, so that those back to back have none between them."""
+        outlines, racks, fronts = [], [], []
+        for shelf in self._site.shelves:
+            body = rack_body(self._site, shelf)
+            left, top = self._at(body.x0_m, body.y0_m)
+            right, bottom = self._at(body.x1_m, body.y1_m)
+            _, front = self._at(shelf.x0_m, shelf.y_m)
+            box = f'x="{left:.1f}" y="{top:.1f}" width="{right - left:.1f}" height="{bottom - top:.1f}"'
+            outlines.append(f'<rect class="rack" {box}/>')
+            racks.append(f'<rect class="shelf" {box}/>')
+            fronts.append(f'<path class="front" d="M{left:.1f} {front:.1f}H{right:.1f}"/>')
+        return [*outlines, *racks, *fronts]
 
     def _lines(self) -> list[str]:
         """All outlines below all paint, so that crossings stay open."""

@@ -152,6 +152,11 @@ class Shelf:
     y_m: float
     height_m: float
 
+    @property
+    def inward(self) -> float:
+        """The y direction from the aisle into the rack, +1 or -1."""
+        return -1.0 if self.side is Side.LEFT else 1.0
+
 
 @dataclass(frozen=True, slots=True)
 class Rack:

@@ -25,7 +25,7 @@ from flightd.replay.report.markup import clock, number, path_data, thin, ticks
 from flightd.replay.report.page import render, write_report
 from flightd.site.site_file import parse_site
 from tests.command import Command
-from tests.replay.synthetic_flight import SITE_TOML, SUMMARY, legs, write_flight
+from tests.replay.synthetic_flight import NS, SITE_TOML, SUMMARY, legs, write_flight
 
 ROOT = Path(__file__).parents[2]
 
@@ -256,22 +256,45 @@ def test_a_picture_that_is_none_is_left_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("x_m", "y_m", "expected_m"),
-    [((0.0, 1.0, 2.0), (0.1, 0.1, 0.1), 0.1), ((0.05, 0.05, 0.05), (0.6, 1.5, 2.4), 0.05)],
+    ("goal", "x_m", "y_m", "expected_m"),
+    [
+        ("A2", (0.0, 1.0, 2.0), (0.1, 0.1, 0.1), 0.1),
+        ("B1", (0.05, 0.05, 0.05), (0.6, 1.5, 2.4), 0.05),
+        ("B3", (0.05, 0.05, 0.05), (0.6, 1.5, 2.4), 0.05),
+        ("A4", (1.0, 1.5, 2.0), (3.0, 3.0, 3.0), 3.0),
+    ],
+    ids=["along", "across", "round a corner", "the wrong aisle"],
 )
 def test_cross_track_is_measured_from_the_way_that_is_flown(
-    tmp_path: Path, x_m: tuple[float, ...], y_m: tuple[float, ...], expected_m: float
+    tmp_path: Path, goal: str, x_m: tuple[float, ...], y_m: tuple[float, ...], expected_m: float
 ) -> None:
     with McapRecorder(tmp_path / "flight.mcap") as recorder:
         recorder.record(Topic.MAP, 0, Document(SITE_TOML))
         for index, (x, y) in enumerate(zip(x_m, y_m, strict=True)):
             stamp_ns = index * 1_000_000_000
-            status = Status(stamp_ns, Phase.FOLLOW, "", "A1", "A2", 0, 1, 1.0, 1.0, 0, 0, 0.0, {})
+            status = Status(stamp_ns, Phase.FOLLOW, "", "A1", goal, 0, 1, 1.0, 1.0, 0, 0, 0.0, {})
             pose = GridPose(stamp_ns, "A1", x, y, 0.0, x, y, 0.0, 0.0, 1.0, (0.0,) * 9, 1.0)
             recorder.record(Topic.STATUS, stamp_ns, status)
             recorder.record(Topic.POSE, stamp_ns, pose)
     flight = load_flight(tmp_path / "flight.mcap")
     assert flight.cross_track_m(flight.estimate) == pytest.approx([expected_m] * 3)
+
+
+def test_where_a_shelf_is_looked_at_from_is_no_cross_track(tmp_path: Path) -> None:
+    """A view half a metre beside its node, between two legs."""
+    phases = (Phase.FOLLOW, Phase.CLIMB, Phase.SCAN, Phase.FOLLOW)
+    with McapRecorder(tmp_path / "flight.mcap") as recorder:
+        recorder.record(Topic.MAP, 0, Document(SITE_TOML))
+        for index, phase in enumerate(phases):
+            stamp_ns, y_m = (index + 1) * NS, 0.1 if phase is Phase.FOLLOW else 0.5
+            status = Status(stamp_ns, phase, "", "A1", "A2", 0, 1, 1.0, 1.0, 0, 0, 0.0, {})
+            pose = GridPose(stamp_ns + 1, "A1", 1.5, y_m, 0.0, 1.5, y_m, 0.0, 0.0, 1.0, (0.0,) * 9, 1.0)
+            recorder.record(Topic.STATUS, stamp_ns, status)
+            recorder.record(Topic.POSE, stamp_ns + 1, pose)
+        recorder.record(Topic.STATUS, 5 * NS, replace(status, stamp_ns=5 * NS))
+    flight = load_flight(tmp_path / "flight.mcap")
+    found = flight.cross_track_m(flight.estimate)
+    assert found == pytest.approx([0.1, math.nan, math.nan, 0.1], nan_ok=True)
 
 
 def test_thinning_keeps_every_peak() -> None:

@@ -15,12 +15,16 @@ from flightd.core.topics import Topic
 from flightd.core.tracks import last_known
 from flightd.core.types import AttitudeSetpoint, Event, Status
 from flightd.mission.safety.hazard_table import HAZARDS
-from flightd.replay.log import Entry, read_log
+from flightd.replay.log import FlightLog, read_log
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, score
 from flightd.sim.judge.hazard_verdict import HazardVerdict, judged_hazard
+from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.judge.verdict import JudgedFault, judged
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
+
+_UNHEARD = frozenset({"companion_dead", "uplink_silent"})
+"""Faults during which the autopilot hears no setpoint."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,27 +48,29 @@ def judge_flight(simulation: Simulation) -> Judgement:
     """Judge the flight whose logs stand in the simulation's folder."""
     flown = read_log(simulation.flight_log, {Topic.STATUS, Topic.EVENT, Topic.SETPOINT, Topic.COMMAND})
     meant = meant_flight(simulation, flown)
-    truth = read_log(simulation.truth_log, {Topic.TRUTH, Topic.FAULT, Topic.ARMED}).entries
-    armed = [ArmedChange(**row) for row in _rows(truth, Topic.ARMED, ArmedChange)]
-    notes = [e.message for e in truth if e.topic == Topic.FAULT and isinstance(e.message, dict)]
+    world = read_log(simulation.truth_log, {Topic.TRUTH, Topic.FAULT, Topic.ARMED})
+    truth = [Kinematics(**row) for row in _rows(world, Topic.TRUTH, Kinematics)]
+    armed = [ArmedChange(**row) for row in _rows(world, Topic.ARMED, ArmedChange)]
+    notes = [e.message for e in world.entries if e.topic == Topic.FAULT and isinstance(e.message, dict)]
     begun = [note for note in notes if note["began"]]
-    dead = _lasted([note for note in notes if note["kind"] == "companion_dead"])
+    unheard = _lasted([note for note in notes if note["kind"] in _UNHEARD])
     statuses = flown.messages(Status)
     evidence = FlightEvidence(
         site=simulation.painted_site,
         plan=meant.plan,
         statuses=statuses,
         events=flown.messages(Event),
-        truth=[Kinematics(**row) for row in _rows(truth, Topic.TRUTH, Kinematics)],
-        # what a computer that is dead would have sent reaches nobody
+        truth=truth,
+        # what reaches nobody steers nobody
         setpoints=[
             sent
             for sent in flown.messages(AttitudeSetpoint)
-            if not any(since_ns <= sent.stamp_ns < until_ns for since_ns, until_ns in dead)
+            if not any(since_ns <= sent.stamp_ns < until_ns for since_ns, until_ns in unheard)
         ],
         armed=armed or None,
         piloted_ns=_piloted_ns(simulation, begun),
-        lost=int(flown.metadata.get("dropped", "0")) + bool(flown.damage),
+        lost=_lost(flown),
+        truth_lost=_lost(world) + TrueMotion.of(truth).gaps,
     )
     figures = score(evidence)
     stock = stock_summary(simulation, meant, figures.flight_time_s)
@@ -73,6 +79,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         figures,
         codes_wrong=stock["codes_wrong"],
         empty_wrong=stock.get("empty_wrong", 0),
+        not_looked_at=stock.get("locations_planned", 0) - stock.get("locations_visited", 0),
     )
     sensors = sensor_summary(simulation, last_known([status.sensors for status in statuses]))
     expected = simulation.scenario.expect
@@ -110,11 +117,16 @@ def _lasted(notes: Sequence[dict[str, Any]]) -> list[tuple[float, float]]:
     ]
 
 
-def _rows(entries: Sequence[Entry], topic: Topic, kind: type) -> list[dict[str, Any]]:
+def _lost(log: FlightLog) -> int:
+    """Messages that were not written, and one for what cannot be read any more."""
+    return int(log.metadata.get("dropped", "0")) + bool(log.damage)
+
+
+def _rows(log: FlightLog, topic: Topic, kind: type) -> list[dict[str, Any]]:
     """The messages of a topic with the fields of `kind` alone, which viewers' fields stand beside."""
     names = [field.name for field in fields(kind)]
     return [
         {name: entry.message[name] for name in names}
-        for entry in entries
+        for entry in log.entries
         if entry.topic == topic and isinstance(entry.message, dict)
     ]

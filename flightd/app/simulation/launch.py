@@ -232,11 +232,10 @@ async def _within_limit(
     simulation: Simulation, daemon: Daemon, *beside: asyncio.Future[None]
 ) -> FlightResult:
     """The flight, unless it takes far longer than its plan can, or what runs beside it fails."""
-    stops = simulation.plan().stops
-    limit_s = 120.0 + 60.0 * (len(stops) + 1)
+    plan = simulation.plan()
+    limit_s = 120.0 + 60.0 * (len(plan.stops) + 1)
     if simulation.config.front_camera.is_fitted:
-        wanted = {stop.node for stop in stops if stop.visit}
-        limit_s += _SCAN_S * sum(place.node in wanted for place in simulation.site.locations.values())
+        limit_s += _SCAN_S * sum(place.node in plan.to_visit for place in simulation.site.locations.values())
     flight = asyncio.ensure_future(daemon.fly())
     parts: list[asyncio.Future[Any]] = [flight, *beside]
     try:

@@ -22,7 +22,7 @@ class MeantFlight:
     @property
     def nodes(self) -> frozenset[str]:
         """Nodes to visit."""
-        return frozenset(stop.node for stop in self.plan.stops if stop.visit)
+        return self.plan.to_visit
 
 
 def meant_flight(simulation: Simulation, flown: FlightLog) -> MeantFlight:

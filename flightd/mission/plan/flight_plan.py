@@ -83,9 +83,14 @@ class FlightPlan:
         return any(stop.waits for stop in self.stops)
 
     @property
+    def to_visit(self) -> frozenset[str]:
+        """The nodes that are visited."""
+        return frozenset(stop.node for stop in self.stops if stop.visit)
+
+    @property
     def nodes(self) -> int:
         """Nodes that are visited, each counted once."""
-        return len({stop.node for stop in self.stops if stop.visit})
+        return len(self.to_visit)
 
 
 def run_of(site: Site, stops: Sequence[Stop]) -> tuple[str, ...]:

@@ -9,21 +9,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from flightd.replay.playback.flight import Array, Leg
+from flightd.replay.playback.legs import way_to
 from flightd.site.site import Node, Site
 
 
-def cross_track_m(site: Site, legs: Sequence[Leg], t_s: Array, x_m: Array, y_m: Array) -> Array:
+def cross_track_m(site: Site, start: str, legs: Sequence[Leg], t_s: Array, x_m: Array, y_m: Array) -> Array:
     """Signed distance of each pose from the nearest line of its leg's way: + towards +y on an aisle, towards
-    +x on a cross line; NaN where no leg is flown, and on one that has no line.  `t_s` rises."""
+    +x on a cross line; NaN where no leg is flown, and on one that has no line.  `start` is the node at which
+    the first leg begins, empty where nobody knows; `t_s` rises."""
     offset = np.full(t_s.shape, math.nan)
-    flown = [(leg.t_s, before, leg) for before, leg in itertools.pairwise(legs) if leg.t_s is not None]
-    if legs and legs[0].t_s is not None:
-        flown.insert(0, (legs[0].t_s, legs[0], legs[0]))
-    ends = [start_s for start_s, _, _ in flown[1:]] + [math.inf]
-    for (start_s, before, leg), end_s in zip(flown, ends, strict=True):
+    flown = [(leg.t_s, (*before.via[-1:], *leg.via)) for before, leg in itertools.pairwise(legs)]
+    if legs:
+        flown.insert(0, (legs[0].t_s, (start, *way_to(site, start, legs[0].via[-1]))))
+    begun = [(start_s, way) for start_s, way in flown if start_s is not None]
+    ends = [start_s for start_s, _ in begun[1:]] + [math.inf]
+    for (start_s, way), end_s in zip(begun, ends, strict=True):
         part = (t_s >= start_s) & (t_s < end_s)
         if part.any():
-            offset[part] = _beside(_lines(site, (*before.via[-1:], *leg.via)), x_m[part], y_m[part])
+            offset[part] = _beside(_lines(site, way), x_m[part], y_m[part])
     return offset
 
 

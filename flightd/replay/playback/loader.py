@@ -117,7 +117,7 @@ def load_playback(path: Path) -> Playback:
     vehicle, setpoints, statuses = (
         table.column_set(start_ns) for table in (gathered.vehicle, gathered.setpoints, gathered.statuses)
     )
-    legs = legs_of(site, moments, gathered.chosen or gathered.nodes)
+    legs = legs_of(site, ((moment.t_s, moment.goal) for moment in moments), gathered.chosen or gathered.nodes)
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is told as unknown
         found = quantities(site, moments, legs, poses, truth, vehicle, setpoints, statuses)
         estimated = _estimated(site, moments, poses, found)

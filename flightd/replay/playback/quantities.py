@@ -62,7 +62,8 @@ def _cross_track(site: Site | None, moments: Sequence[Moment], legs: Sequence[Le
     """Beside the leg while it is followed; over a node the hover error tells."""
     if site is None:
         return np.full(poses["t_s"].shape, math.nan)
-    offset = cross_track_m(site, legs, poses["t_s"], poses["x_m"], poses["y_m"])
+    start = next((moment.node for moment in moments if moment.node), "")
+    offset = cross_track_m(site, start, legs, poses["t_s"], poses["x_m"], poses["y_m"])
     offset[~in_phases(moments, poses["t_s"], {Phase.FOLLOW})] = math.nan
     return offset
 

@@ -6,6 +6,7 @@ Times are seconds since the first message that the flight clock stamped.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -15,6 +16,8 @@ from numpy.typing import NDArray
 from flightd.core.tracks import SensorEstimate
 from flightd.core.types import Event, LineSet, Phase, Status
 from flightd.replay.log import FlightLog
+from flightd.replay.playback.cross_track import cross_track_m
+from flightd.replay.playback.flight import Leg
 from flightd.site.site import Site
 
 Array: TypeAlias = NDArray[np.float64]
@@ -28,12 +31,8 @@ FLYING = frozenset(
     }
 )  # fmt: skip
 """Phases in which the drone holds on to a line."""
-
-_WINDOW_S = 0.6
-"""The direction of flight is judged over twice this time."""
-
-_STILL_M = 0.15
-"""Who moved less in that time stands still."""
+_AT_A_VIEW = frozenset({Phase.CLIMB, Phase.SCAN})
+"""Of these, those that it may spend beside its leg, where it looks at a shelf from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +114,8 @@ class Latency:
 @dataclass(frozen=True, slots=True)
 class RecordedFlight:
     """A flight as the report shows it.  `truth` and `summary` are there if their files are; `smoothed` is the
-    estimate judged afterwards.  `sensors` is what the lines said last of the drone's
-    own sensors; `nodes` are those that were ordered, none: all of them."""
+    estimate judged afterwards.  `legs` begin at the node `start`, the first that was told.  `sensors` is what
+    the lines said last of the drone's own sensors; `nodes` are those that were ordered, none: all of them."""
 
     log: FlightLog
     start_ns: int
@@ -124,6 +123,8 @@ class RecordedFlight:
     site: Site | None
     map_error: str
     phases: tuple[PhaseSpan, ...]
+    start: str
+    legs: tuple[Leg, ...]
     visits: tuple[Visit, ...]
     estimate: Track
     truth: Track | None
@@ -148,53 +149,20 @@ class RecordedFlight:
 
     def flying(self, t_s: Array) -> NDArray[np.bool_]:
         """Which of these times fall into a phase in which the drone follows or holds a line."""
+        return self._within(t_s, FLYING)
+
+    def _within(self, t_s: Array, phases: Collection[Phase]) -> NDArray[np.bool_]:
         inside = np.zeros(t_s.shape, bool)
         for span in self.phases:
-            if span.phase in FLYING:
+            if span.phase in phases:
                 inside |= (t_s >= span.start_s) & (t_s <= span.end_s)
         return inside
 
     def cross_track_m(self, track: Track) -> Array:
-        """Signed distance of a track from the painted way it follows: + towards +y on an aisle, towards
-        +x on a cross line; NaN outside of the flying phases and without a map."""
-        distance = np.full(track.t_s.shape, math.nan)
-        chosen = self.flying(track.t_s)
-        if self.site is not None and chosen.any():
-            along_x = _flies_along_x(track)
-            for axis in (True, False):
-                part = chosen & (along_x == axis)
-                distance[part] = _offset_m(self.site, track.x_m[part], track.y_m[part], axis)
+        """Signed distance of a track from the way of the leg that is flown: + towards +y on an aisle, towards
+        +x on a cross line; NaN on the floor, where a shelf is looked at, and without a map."""
+        if self.site is None:
+            return np.full(track.t_s.shape, math.nan)
+        distance = cross_track_m(self.site, self.start, self.legs, track.t_s, track.x_m, track.y_m)
+        distance[~self._within(track.t_s, FLYING - _AT_A_VIEW)] = math.nan
         return distance
-
-
-def _flies_along_x(track: Track) -> NDArray[np.bool_]:
-    """Whether the drone flies along x (an aisle) or y; while it stands still, as it came."""
-    ahead_x, ahead_y = track.at(np.minimum(track.t_s + _WINDOW_S, track.t_s[-1]))
-    behind_x, behind_y = track.at(np.maximum(track.t_s - _WINDOW_S, track.t_s[0]))
-    moved_x, moved_y = np.abs(ahead_x - behind_x), np.abs(ahead_y - behind_y)
-    moving = np.hypot(moved_x, moved_y) > _STILL_M
-    if not moving.any():
-        return np.ones(track.t_s.shape, bool)
-    newest = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
-    newest[newest < 0] = int(np.argmax(moving))
-    along_x: NDArray[np.bool_] = (moved_x >= moved_y)[newest]
-    return along_x
-
-
-def _offset_m(site: Site, x_m: Array, y_m: Array, along_x: bool) -> Array:
-    """Signed distance across the nearest of the edges that run along x (or y); NaN if there is none."""
-    nearest = np.full(x_m.shape, math.inf)
-    offset = np.full(x_m.shape, math.nan)
-    for edge in site.edges:
-        a, b = site.nodes[edge.a], site.nodes[edge.b]
-        if (abs(b.x_m - a.x_m) >= abs(b.y_m - a.y_m)) != along_x:
-            continue
-        if along_x:
-            low, high, position, across = *sorted((a.x_m, b.x_m)), x_m, y_m - a.y_m
-        else:
-            low, high, position, across = *sorted((a.y_m, b.y_m)), y_m, x_m - a.x_m
-        distance = np.hypot(position - np.clip(position, low, high), across)
-        closer = distance < nearest
-        nearest = np.where(closer, distance, nearest)
-        offset = np.where(closer, across, offset)
-    return offset

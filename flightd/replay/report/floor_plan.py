@@ -11,9 +11,9 @@ import numpy as np
 from flightd.core.paint import is_tone
 from flightd.replay.report.flight import Array, RecordedFlight, Track
 from flightd.replay.report.markup import element, number, path_data, scrolled, text
-from flightd.site.site import Shelf, Side, Site
+from flightd.site.rack_depth import RACK_DEPTH_M, rack_body
+from flightd.site.site import Shelf, Site
 
-_SHELF_DEPTH_M = 0.45
 _MARGIN_M = 0.35
 _WIDTH_PX = 1000.0
 """Width of the drawing's own units: sizes of text and marks below are in them."""
@@ -78,7 +78,7 @@ def _bounds(flight: RecordedFlight) -> tuple[float, float, float, float] | None:
     boxes = []
     if flight.site is not None:
         x0, y0, x1, y1 = flight.site.bounds()
-        depth = _SHELF_DEPTH_M if flight.site.shelves else 0.0
+        depth = RACK_DEPTH_M if flight.site.shelves else 0.0
         boxes.append((x0, y0 - depth, x1, y1 + depth))
     boxes += [
         (track.x_m.min(), track.y_m.min(), track.x_m.max(), track.y_m.max())
@@ -93,7 +93,7 @@ def _bounds(flight: RecordedFlight) -> tuple[float, float, float, float] | None:
 
 
 def _site(site: Site, place: _Projection) -> str:
-    shelves = "".join(_shelf(shelf, place) for shelf in site.shelves)
+    shelves = "".join(_shelf(site, shelf, place) for shelf in site.shelves)
     lines = "".join(
         f'<line class="paint" x1="{number(place.x(line.x0_m))}" y1="{number(place.y(line.y0_m))}" '
         f'x2="{number(place.x(line.x1_m))}" y2="{number(place.y(line.y1_m))}" '
@@ -113,10 +113,9 @@ def _site(site: Site, place: _Projection) -> str:
     return element("g", shelves, lines, pads, class_=f"site {site.line_colour}", style=tone)
 
 
-def _shelf(shelf: Shelf, place: _Projection) -> str:
-    depth = _SHELF_DEPTH_M * place.scale
-    front = place.y(shelf.y_m)
-    top = front - depth if shelf.side == Side.LEFT else front
+def _shelf(site: Site, shelf: Shelf, place: _Projection) -> str:
+    body = rack_body(site, shelf)
+    front, top, depth = place.y(shelf.y_m), place.y(body.y0_m), (body.y1_m - body.y0_m) * place.scale
     x0, x1 = place.x(shelf.x0_m), place.x(shelf.x1_m)
     label = element("title", text(f"shelf {shelf.aisle} {shelf.side}"))
     return (

@@ -30,6 +30,7 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.replay.log import FlightLog, read_log
+from flightd.replay.playback.legs import legs_of
 from flightd.replay.recorded_map import recorded_map
 from flightd.replay.report.flight import (
     NS_PER_S,
@@ -73,6 +74,8 @@ def load_flight(path: Path) -> RecordedFlight:
         site=site,
         map_error=map_error,
         phases=phases,
+        start=next((status.node for status in statuses if status.node), ""),
+        legs=legs_of(site, (((status.stamp_ns - start_ns) / NS_PER_S, status.goal) for status in statuses)),
         visits=tuple(_visits(statuses, start_ns, site, estimate, truth)),
         estimate=estimate,
         truth=truth,

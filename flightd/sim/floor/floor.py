@@ -21,7 +21,7 @@ from flightd.sim.floor.paint_damage import UNDAMAGED, PaintDamage, Stripe, strok
 from flightd.sim.floor.printed_markers import FloorSigns
 from flightd.sim.floor.texture import Box, NoiseField, Patch
 from flightd.sim.floor.wear_marks import FloorMarks
-from flightd.site.site import PadSign, Side, Site
+from flightd.site.site import PadSign, Site
 
 Floats: TypeAlias = NDArray[np.float32]
 
@@ -225,12 +225,11 @@ def _shelf_feet(site: Site) -> tuple[list[Box], list[Box]]:
     uprights: list[Box] = []
     pallets: list[Box] = []
     for shelf in site.shelves:
-        outward = -1.0 if shelf.side is Side.LEFT else 1.0
-        front, back = shelf.y_m, shelf.y_m + outward * 0.12
+        front, back = shelf.y_m, shelf.y_m + shelf.inward * 0.12
         for x_m in np.arange(shelf.x0_m, shelf.x1_m + 0.01, 1.9):
             left = float(min(x_m, shelf.x1_m - 0.1))
             uprights.append((left, min(front, back), left + 0.1, max(front, back)))
-            near, far = shelf.y_m + outward * 0.18, shelf.y_m + outward * 0.9
+            near, far = shelf.y_m + shelf.inward * 0.18, shelf.y_m + shelf.inward * 0.9
             for k in range(2):
                 start = left + 0.15 + 0.86 * k
                 if start + 0.8 < shelf.x1_m:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flightd.sim.appearance import Appearance
 from flightd.sim.floor.texture import Patch
 from flightd.sim.floor.wear_marks import MARGIN_M
-from flightd.site.site import Side, Site
+from flightd.site.site import Site
 
 Floats: TypeAlias = NDArray[np.float32]
 
@@ -102,8 +102,7 @@ def _shelf_shadows(site: Site, depth: float, xs: Floats, ys: Floats) -> Floats:
     """Dark below the shelves, a soft edge in front, and the uprights' slim shadows into the aisle."""
     light = np.ones((len(ys), len(xs)), np.float32)
     for shelf in site.shelves:
-        outward = -1.0 if shelf.side is Side.LEFT else 1.0
-        behind = (ys - shelf.y_m) * outward
+        behind = (ys - shelf.y_m) * shelf.inward
         edge = np.clip(0.5 + (behind - 0.05) / 0.2, 0.0, 1.0) * (behind < 1.2)
         before = 0.35 * np.exp(-np.clip(-behind, 0.0, None) / 0.3) * (behind <= 0.0)
         span = np.clip((xs - shelf.x0_m) / 0.2 + 0.5, 0, 1) * np.clip((shelf.x1_m - xs) / 0.2 + 0.5, 0, 1)

@@ -8,7 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from flightd.sim.floor.texture import Box
-from flightd.site.site import PaintedLine, Side, Site
+from flightd.site.rack_depth import rack_body
+from flightd.site.site import PaintedLine, Site
 
 _TRIES = 400
 """A floor that is too crowded for what is wished ends the search."""
@@ -21,7 +22,6 @@ PALLET_HEIGHT_M = 0.144
 _RAGGED_M = 0.02
 """By how much a gap is wider than its line: a line's edge is not straight."""
 _ALONGSIDE_M = 0.15
-_SHELF_DEPTH_M = 1.0
 _LEAST_HIDDEN_M = 0.1
 _ASKEW = 0.3
 """Share of the false lines that run neither along x nor along y."""
@@ -101,11 +101,8 @@ class _Hall:
         self._lines = site.lines
         self._lengths_m = [painted_m([line]) for line in site.lines]
         self._bounds = site.bounds()
-        self._shelves = [
-            (shelf.x0_m, min(shelf.y_m, back_m), shelf.x1_m, max(shelf.y_m, back_m))
-            for shelf in site.shelves
-            for back_m in (shelf.y_m + (-_SHELF_DEPTH_M if shelf.side is Side.LEFT else _SHELF_DEPTH_M),)
-        ]
+        bodies = [rack_body(site, shelf) for shelf in site.shelves]
+        self._shelves = [(body.x0_m, body.y0_m, body.x1_m, body.y1_m) for body in bodies]
         self._taken: list[Box] = []
         self._pads: list[Box] = []
         for pad in site.pads:

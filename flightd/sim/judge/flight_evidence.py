@@ -11,7 +11,7 @@ from functools import cached_property
 from flightd.core.types import AttitudeSetpoint, Event, Phase, Status
 from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.sim.judge.motion import TrueMotion
-from flightd.sim.plant.kinematics import ArmedChange, Kinematics
+from flightd.sim.plant.kinematics import ON_FLOOR_M, ArmedChange, Kinematics
 from flightd.site.site import Site
 
 
@@ -21,7 +21,7 @@ class FlightEvidence:
     the daemon's, `truth` and `armed` the simulator's; all in time order.  `armed` is None where the vehicle
     does not tell.  `piloted_ns`: from when on there was a pilot who could take over, infinite where there was
     none; a hand-over before is the autopilot's failsafe, and still judged.  `lost`: messages that the flight
-    log did not take."""
+    log did not take; `truth_lost`: those that the truth lacks, and its gaps."""
 
     site: Site
     plan: FlightPlan
@@ -32,6 +32,7 @@ class FlightEvidence:
     armed: Sequence[ArmedChange] | None = None
     piloted_ns: float = -math.inf
     lost: int = 0
+    truth_lost: int = 0
 
     @cached_property
     def handed_over_ns(self) -> float:
@@ -58,10 +59,21 @@ class FlightEvidence:
         """When it first left the floor; infinite if it never did."""
         return float(self.in_air.stamp_s[0]) if len(self.in_air) else math.inf
 
+    def armed_s(self) -> list[tuple[float, float]]:
+        """From when to when, s of the clock, it was armed; infinite where it stays so.  Empty where the
+        vehicle does not tell."""
+        changes = self.armed or ()
+        ends_s = [*(change.stamp_ns * 1e-9 for change in changes[1:]), math.inf]
+        return [
+            (change.stamp_ns * 1e-9, end_s)
+            for change, end_s in zip(changes, ends_s, strict=False)
+            if change.armed
+        ]
+
     @property
     def landed(self) -> Kinematics | None:
         """Where it stands at the end, None where it does not, or never flew."""
-        down = len(self.in_air) and self.truth[-1].height_m <= _ON_FLOOR_M
+        down = len(self.in_air) and self.truth[-1].height_m <= ON_FLOOR_M
         return self.truth[-1] if down else None
 
     def truth_at(self, stamp_ns: int) -> Kinematics | None:
@@ -73,6 +85,3 @@ class FlightEvidence:
         """The phase that the daemon said to be in."""
         index = bisect_left(self.statuses, stamp_ns, key=lambda status: status.stamp_ns) - 1
         return self.statuses[index].phase if index >= 0 else Phase.PREFLIGHT
-
-
-_ON_FLOOR_M = 0.2

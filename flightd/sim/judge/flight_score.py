@@ -14,13 +14,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightd.core.types import Event, EventLevel, Phase
 from flightd.sim.judge.clearance import clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.hover_error import hover_errors
 from flightd.sim.judge.meant_leg import off_leg
-from flightd.sim.judge.motion import OFF_FLOOR_M, TrueMotion, Values
+from flightd.sim.judge.motion import TrueMotion, Values
+from flightd.sim.plant.kinematics import OFF_FLOOR_M
 
 _AT_NODE_M = 0.5
 """A node counts as visited rightly when the drone was within this of it (less than half a cell)."""
@@ -31,8 +33,9 @@ _LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
 """An event of this phase is a warning where the landing is not the plan's."""
 _CONTROL_GAP_S = 0.5
 """Setpoints further apart leave the drone to itself."""
-_SINKING_MPS = -0.1
-"""Who sinks like this is being landed by its autopilot."""
+_SUNK_M, _SINKS_S = 0.1, 1.0
+"""Who is lower by so much than it ever was until so long ago, since nobody steers it, is being landed by
+its autopilot; who bobs or sags is not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,7 @@ def score(flight: FlightEvidence) -> FlightScore:
         mission="completed" if final and final.phase is Phase.DONE else "aborted",
         reason=final.reason if final else "the daemon never spoke",
         nodes_planned=flight.plan.nodes,
-        nodes_visited=len({visit.text for visit in visits}),
+        nodes_visited=len(flight.plan.to_visit & {visit.text for visit in visits}),
         nodes_miscounted=len(visits) - len(right),
         cross_track_rms_m=_rounded(math.sqrt(float(np.mean(off**2))) if len(off) else None),
         cross_track_max_m=_rounded(float(off.max()) if len(off) else None),
@@ -124,13 +127,29 @@ def longest_uncontrolled(flight: FlightEvidence) -> tuple[float, float]:
         return math.inf, 0.0
     before = np.searchsorted(sent, motion.stamp_s, side="right")
     age_s = motion.stamp_s - np.r_[-math.inf, sent][before]
-    alone = (age_s > _CONTROL_GAP_S) & (motion.climb_mps > _SINKING_MPS)
+    alone = age_s > _CONTROL_GAP_S
+    alone &= ~_sinks(motion, alone)
     longest, since = (math.inf, 0.0), math.inf
     for stamp_s, is_alone in zip(motion.stamp_s, alone, strict=True):
         since = min(since, stamp_s) if is_alone else math.inf
         if stamp_s - since > longest[1]:
             longest = (float(since), float(stamp_s - since))
     return longest
+
+
+def _sinks(motion: TrueMotion, alone: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """At which samples, (n,), of those where the drone is `alone` its autopilot lands it."""
+    sinks = np.zeros(len(motion), np.bool_)
+    least_m, seen = math.inf, 0
+    for number in range(len(motion)):
+        if not alone[number]:
+            least_m, seen = math.inf, number + 1
+            continue
+        while motion.stamp_s[seen] <= motion.stamp_s[number] - _SINKS_S:
+            least_m = min(least_m, float(motion.height_m[seen]))
+            seen += 1
+        sinks[number] = math.isfinite(least_m) and motion.height_m[number] < least_m - _SUNK_M
+    return sinks
 
 
 def _landed_error_m(flight: FlightEvidence) -> float | None:

@@ -13,10 +13,9 @@ from flightd.sim.judge.expectation import Expectation
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore
 from flightd.sim.judge.verdict import DOWN_S, MISSION_KINDS, JudgedFault
-from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.kinematics import ON_FLOOR_M, Kinematics
 from flightd.site.site import Site
 
-_ON_FLOOR_M = 0.2
 _AT_PAD_M = 0.5
 _ENDS = {"landed": {"landed", "home"}, "down": {"landed", "home", "completed"}}
 """What is as good an end as the one that is expected."""
@@ -98,8 +97,9 @@ def _found_s(row: Hazard, events: Sequence[Event], first_ns: int, from_ns: int) 
     """None where it was not told since `first_ns`."""
     if row.trigger is None:
         return None
+    told = f"{row.trigger.value}: "  # what is done follows; other hazards' texts begin like this one's
     for event in events:
-        if event.name == "hazard" and event.stamp_ns >= first_ns and event.text.startswith(row.trigger.value):
+        if event.name == "hazard" and event.stamp_ns >= first_ns and event.text.startswith(told):
             return max(0.0, (event.stamp_ns - from_ns) * 1e-9)
     return None
 
@@ -123,7 +123,7 @@ def _outcome(flight: FlightEvidence, phase: Phase | None) -> str:
         return "handed over"
     if not len(flight.in_air):
         return "never flew"
-    if (end := flight.truth[-1]).height_m > _ON_FLOOR_M:
+    if (end := flight.truth[-1]).height_m > ON_FLOOR_M:
         return "in the air"
     if phase is Phase.DONE:
         return "completed"

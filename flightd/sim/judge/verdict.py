@@ -12,7 +12,8 @@ from flightd.mission.safety.hazard_table import Action
 from flightd.sim.judge.clearance import BODY_RADIUS_M, clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, longest_uncontrolled, off_leg_in_air, overshoot
-from flightd.sim.judge.motion import OFF_FLOOR_M
+from flightd.sim.judge.motion import GAP_S
+from flightd.sim.plant.kinematics import OFF_FLOOR_M
 from flightd.site.site import Site
 
 OFF_LEG_M = 0.9
@@ -44,7 +45,7 @@ class JudgedFault:
 
 
 KINDS = {
-    "hit_rack": "the body touched a shelf front, by m",
+    "hit_rack": "the body touched a rack, by m",
     "hit_ceiling": "the body touched the ceiling, by m",
     "hit_keep_out": "the body was in a keep-out, by m",
     "left_leg": f"more than {OFF_LEG_M:g} m, or than shelves leave room, beside the leg that was meant, by m",
@@ -55,12 +56,14 @@ KINDS = {
     "stayed_up": "in the air at the end, m above the floor",
     "stayed_armed": f"armed on the floor for more than {_STAYS_ARMED_S:g} s, or at the end, s",
     "record_lost": "messages that the flight log did not take, or its end, number",
+    "truth_lost": f"what the log of the truth lacks, and gaps of more than {GAP_S:g} s in the air, number",
     "aborted": "the mission was not completed, nodes left",
     "miscounted": "nodes visited that were others",
     "not_visited": "planned nodes that a completed mission left out",
     "off_pad": f"landed more than {_OFF_PAD_M:g} m beside the pad's centre, m",
     "codes_wrong": "codes in the inventory that are not on the shelf",
     "empty_wrong": "places called empty that are not",
+    "unanswered": "planned places of which a completed mission has no look that counts",
     "not_found": "the scenario's hazard was not found",
     "found_late": "the hazard was found later than the scenario allows, s",
     "other_action": "the daemon did not do what the table of hazards says",
@@ -69,7 +72,7 @@ KINDS = {
 }
 """What each kind of fault says, with its value."""
 
-MISSION_KINDS = frozenset({"aborted", "not_visited", "off_pad"})
+MISSION_KINDS = frozenset({"aborted", "not_visited", "off_pad", "unanswered"})
 """What is no fault where a scenario asks for another end than a completed mission."""
 SAFETY_KINDS = frozenset(
     {
@@ -83,27 +86,36 @@ SAFETY_KINDS = frozenset(
         "stayed_up",
         "stayed_armed",
         "down_late",
+        "truth_lost",
     }
 )
-"""What must never be, whatever goes wrong."""
+"""What must never be, whatever goes wrong; and without the truth nobody knows of it."""
 _ASKS_FOR_LANDING = tuple(f": {action.value}" for action in (Action.LAND, Action.STOP))
 
 
 def judged(
-    flight: FlightEvidence, score: FlightScore, *, codes_wrong: int = 0, empty_wrong: int = 0
+    flight: FlightEvidence,
+    score: FlightScore,
+    *,
+    codes_wrong: int = 0,
+    empty_wrong: int = 0,
+    not_looked_at: int = 0,
 ) -> list[JudgedFault]:
-    """All faults of a flight, in the order of `KINDS`."""
+    """All faults of a flight, in the order of `KINDS`.  `not_looked_at`: places that were to be counted,
+    and of which it is not even known that they are unreadable or covered."""
     end_s = float(flight.truth[-1].stamp_ns * 1e-9) - flight.begun_s if flight.truth else 0.0
     counts = {
         "record_lost": flight.lost,
+        "truth_lost": flight.truth_lost,
         "miscounted": score.nodes_miscounted,
         "codes_wrong": codes_wrong,
         "empty_wrong": empty_wrong,
     }
     if score.mission != "completed":
         counts["aborted"] = max(score.nodes_planned - score.nodes_visited, 1)
-    elif score.nodes_visited < score.nodes_planned:
+    else:
         counts["not_visited"] = score.nodes_planned - score.nodes_visited
+        counts["unanswered"] = not_looked_at
     found = [JudgedFault(kind, _finite(end_s), float(count)) for kind, count in counts.items() if count]
     if len(flight.in_air):
         found += [*_in_the_air(flight), *_at_the_floor(flight)]
@@ -153,6 +165,7 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
         at_s = float(motion.stamp_s[touching[int(np.argmax(sink_mps))]]) - begun_s
         yield JudgedFault("hard_landing", round(at_s, 2), round(float(sink_mps.max()), 2))
     yield from _leaning(flight)
+    yield from _staying_armed(flight)
     if flight.handed_over:
         return
     asked = [
@@ -165,12 +178,21 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
     end_s = last.stamp_ns * 1e-9
     if last.height_m > OFF_FLOOR_M:
         yield JudgedFault("stayed_up", round(end_s - begun_s, 2), round(last.height_m, 2))
-    elif flight.armed is not None and len(touched):
-        down_s = float(motion.stamp_s[touched[-1] + 1])
-        disarmed = [c.stamp_ns * 1e-9 for c in flight.armed if not c.armed and c.stamp_ns * 1e-9 >= down_s]
-        armed_s = (disarmed[0] if disarmed else end_s) - down_s
-        if not disarmed or armed_s > _STAYS_ARMED_S:
-            yield JudgedFault("stayed_armed", round(down_s - begun_s, 2), round(armed_s, 2))
+
+
+def _staying_armed(flight: FlightEvidence) -> Iterator[JudgedFault]:
+    """Before each take-off and after each landing; what is armed when a pilot takes over is his."""
+    end_s = math.inf if flight.handed_over else float(flight.motion.stamp_s[-1])
+    wrong = []
+    for down_s, up_s in flight.motion.on_floor_s():
+        for since_s, until_s in flight.armed_s():
+            first_s, last_s = max(down_s, since_s), min(up_s, until_s)
+            if last_s - first_s > _STAYS_ARMED_S or first_s <= last_s == end_s:
+                wrong.append((first_s, last_s - first_s))
+    if wrong:
+        yield JudgedFault(
+            "stayed_armed", round(wrong[0][0] - flight.begun_s, 2), round(max(s for _, s in wrong), 2)
+        )
 
 
 def _leaning(flight: FlightEvidence) -> Iterator[JudgedFault]:

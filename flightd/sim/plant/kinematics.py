@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+OFF_FLOOR_M = 0.3
+"""A body origin higher than this flies; standing it is 0.1 m above the floor."""
+ON_FLOOR_M = 0.2
+"""One that is no higher at the end of a flight has come down."""
+
 
 @dataclass(frozen=True, slots=True)
 class Kinematics:

@@ -17,8 +17,6 @@ BEAM_M = 0.10
 """Height of a beam's face, below its deck; where decks are close, of half the distance between them."""
 UPRIGHT_M = 0.08
 """Width of an upright, which stands on the line between two bays."""
-DEPTH_M = 0.9
-"""From the face to the mesh at the back."""
 _LEAST_PITCH_M, _LEAST_ROOM_M = 0.15, 0.05
 """From deck to deck where a site's labels do not say it any closer, and above the topmost deck."""
 
@@ -66,11 +64,11 @@ class Face:
 
     @property
     def right(self) -> float:
-        return 1.0 if self.shelf.side is Side.LEFT else -1.0
+        return -self.shelf.inward
 
     @property
     def inward(self) -> float:
-        return -self.right
+        return self.shelf.inward
 
     @property
     def x0_m(self) -> float:

@@ -15,10 +15,11 @@ from flightd.core.geometry import Matrix
 from flightd.core.types import Image
 from flightd.sim.racks.goods import GoodsPainter
 from flightd.sim.racks.panels import Pane, Panel, Texture
-from flightd.sim.racks.rack_layout import BEAM_M, DEPTH_M, UPRIGHT_M, Face, Opening, RackLevel
+from flightd.sim.racks.rack_layout import BEAM_M, UPRIGHT_M, Face, Opening, RackLevel
 from flightd.sim.racks.stacks import Goods
 from flightd.sim.racks.steel import BLUE, ORANGE, back, beam, upright
 from flightd.sim.racks.stock import StockPlace
+from flightd.site.rack_depth import RACK_DEPTH_M
 
 _REACH_M = 7.0
 """Along the aisle, what is farther is not drawn."""
@@ -62,7 +63,7 @@ class Sightline:
 
     def depth_m(self, part: float) -> tuple[float, float]:
         """The y of the face, and of that part of the way to its back."""
-        return self.face.y_m, self.face.y_m + self.face.inward * DEPTH_M * part
+        return self.face.y_m, self.face.y_m + self.face.inward * RACK_DEPTH_M * part
 
 
 class Racks:
@@ -221,7 +222,7 @@ def _reach(face: Face, view: CameraView) -> tuple[float, float]:
     x, y, _ = at.map_from_image @ rays
     if (y * face.inward).min() < _LEAST_SLOPE:
         return low_m, high_m
-    found = [at.x_m + x / y * (y_m - at.y_m) for y_m in (face.y_m, face.y_m + face.inward * DEPTH_M)]
+    found = [at.x_m + x / y * (y_m - at.y_m) for y_m in (face.y_m, face.y_m + face.inward * RACK_DEPTH_M)]
     return max(float(np.min(found)), low_m), min(float(np.max(found)), high_m)
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightd.sim.racks.cartons import CartonStack
-from flightd.sim.racks.rack_layout import DEPTH_M, Opening
+from flightd.sim.racks.rack_layout import Opening
+from flightd.site.rack_depth import RACK_DEPTH_M
 
 PALLET_M = 0.10
 BARE_M = 0.35
@@ -96,7 +97,7 @@ def in_stacks(whole: Goods, opening: Opening, rng: np.random.Generator) -> Goods
                 right_m=left_m + width_m / 2,
                 recess_m=recess_m,
                 looks=whole.looks + number,
-                depth_m=float(rng.uniform(0.3, 0.85)) * (DEPTH_M - max(recess_m, 0.0)),
+                depth_m=float(rng.uniform(0.3, 0.85)) * (RACK_DEPTH_M - max(recess_m, 0.0)),
                 lean_m=lean_m,
             )
         )

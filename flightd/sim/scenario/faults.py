@@ -19,7 +19,7 @@ from flightd.ports import Clock, Recorder
 from flightd.sim.autopilot.autopilot import AutopilotPeer
 from flightd.sim.floor.texture import Box
 from flightd.sim.plant.airframe import Airframe, AirframeParams
-from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.plant.kinematics import OFF_FLOOR_M, Kinematics
 from flightd.sim.plant.wind import Wind, WindParams
 from flightd.sim.scenario.fault_schema import (
     AttitudeBiased,
@@ -64,7 +64,6 @@ _WITHHELD: Mapping[str, frozenset[int]] = {
     "battery_silent": frozenset({dialect.MAVLINK_MSG_ID_BATTERY_STATUS, dialect.MAVLINK_MSG_ID_SYS_STATUS}),
 }
 """Which messages a fault of the link keeps back."""
-_OFF_FLOOR_M = 0.3
 _HERE_M = 0.4
 
 OF_ARDRONE = frozenset({"companion_dead"})
@@ -105,7 +104,7 @@ class FaultSchedule:
 
     def step(self, now_ns: int, truth: Kinematics) -> list[tuple[int, bool]]:
         """What begins (True) and ends (False) now, by the faults' numbers."""
-        if self._off_ns is None and truth.height_m >= _OFF_FLOOR_M:
+        if self._off_ns is None and truth.height_m >= OFF_FLOOR_M:
             self._off_ns = now_ns
         turns: list[tuple[int, bool]] = []
         for index, fault in enumerate(self._faults):

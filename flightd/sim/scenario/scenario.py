@@ -1,72 +1,7 @@
-"""Scenarios: what a simulated flight is flown in.  A small typed TOML format; every key may be left out.
+"""What a simulated flight is flown in: a small typed TOML format of which every key may be left out.
 
-[camera]                 # the down camera
-width_px = 640
-height_px = 360
-fps = 30
-capture_delay_s = 0.060  # from mid-exposure to arrival
-jitter_s = 0.003
-exposure_s = 0.004
-
-[front_camera]           # where the site has racks
-width_px = 1280
-height_px = 800
-focal_px = 1000.0
-fps = 4
-exposure_s = 0.002
-capture_delay_s = 0.080
-jitter_s = 0.005
-focus_m = 1.2            # distance that is in focus
-
-[racks]                  # shares of all places; what is left over has one clean label
-empty = 0.12
-tilted = 0.08
-glossy = 0.06
-several = 0.05           # two labels
-torn = 0.03
-too_small = 0.02
-missing = 0.03           # goods without a label
-occluded = 0.03          # a sheet hangs before the goods
-in_part = 0.0            # part of the places with goods that they fill only in part, in stacks
-cartons = 0.0            # part of the others where cartons of one kind are stacked, most of them regularly
-location_labels = true   # each location's code on the beam below it
-seed = 1                 # of the goods; left out: the flight's
-noise = 2.0              # grey levels at mid grey
-exposure = 1.0           # brightness
-
-[floor]
-appearance = "default"   # default, clean, harsh, dim, glossy or worn
-pad_off_m = [0.0, 0.0]   # how far the pads have been pushed from where the map has them, x and y
-map_error_m = 0.0        # by up to so much each painted line lies beside its place on the map; not the pad's
-
-[wind]
-mean_x_mps = 0.0         # steady wind in the map frame
-mean_y_mps = 0.0
-gust_mps = 0.3           # root mean square of the gusts
-
-[vehicle]
-battery = 1.0            # charge at the start, 0..1
-battery_ah = 5.0         # its capacity; hovering takes 14 A
-swap_s = 30.0            # time in which somebody changes it on the charge pad; 0: nobody does
-contact_s = 0.0          # instead: time in which the charge pad's contacts fill an empty one
-start_offset_m = [0.0, 0.0]  # how far from the pad it really stands at the start, x and y
-start_yaw_deg = 0.0      # how far it is turned from the heading in which it should stand, + to the right
-clock_ppm = 20.0         # by so many millionths the autopilot's clock runs fast
-range_least_m = 0.05     # the range finder measures from here on; the drone stands with it 0.10 m high
-# second_range_m = 0.1   # a second one beside it reads so much more, and nothing on the floor
-
-[[fault]]                # any number of them; the kinds and their keys are in `fault_schema`
-kind = "camera_frozen"
-at_x_m = 2.2             # or at_node = "A2", at_s = 12.0 after take-off, from_start = true
-at_y_m = 0.0
-duration_s = 3.0         # left out: to the end
-
-[expect]                 # what `--scenario all` holds the flight to
-hazard = "camera_frozen" # as in `mission.hazards`
-found_s = 0.5            # after the first fault began; without faults, or before it flew, after take-off
-ends = "landed"          # completed, home, landed (on a pad too), down (any of these), handed over
-tolerates = ["left_leg"] # kinds of fault that are none here (`sim.judge.verdict`)
-"""
+The guide ("Simulation") has all of them with their defaults; the kinds of `[[fault]]` and their keys are in
+`fault_schema`, those of `[expect]` in `sim.judge.expectation`."""
 
 from __future__ import annotations
 

@@ -36,11 +36,6 @@ _QUALIFIERS = ("22", "10", "21")
 _LONGEST = 2048
 
 
-def same_code(a: str, b: str) -> bool:
-    """Whether both name the same thing."""
-    return code_key(a) == code_key(b)
-
-
 def code_key(text: str) -> str:
     """The same for the same code, another one for another; for comparing, not for people."""
     bare = _AIM.sub("", text.strip())

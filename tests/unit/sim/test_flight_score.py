@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flightd.core.types import AttitudeSetpoint, Event, EventLevel, Phase
+from flightd.sim.judge.clearance import BODY_RADIUS_M, clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import score
+from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.judge.verdict import KINDS, OFF_LEG_M, judged, off_leg_bound_m
 from flightd.sim.plant.kinematics import ArmedChange
+from flightd.site.site_file import load_site
 from flightd.site.ways import KeepOut
 from tests.rigs.flight_evidence import MS, SITE, S, at, evidence, landed, status
 
@@ -130,6 +135,28 @@ def test_the_body_is_measured_with_its_propellers() -> None:
     assert score(evidence([at(0, y_m=1.2, height_m=3.4)], [status(0)])).min_clearance_m == pytest.approx(0.3)
 
 
+RACKS = load_site(Path(__file__).parents[3] / "configs" / "site-racks.toml")
+
+
+@pytest.mark.parametrize(("x_m", "free_m"), [(0.3, 0.0), (0.5, -0.2), (0.8, -BODY_RADIUS_M)])
+def test_beside_a_cross_way_stand_the_ends_of_racks(x_m: float, free_m: float) -> None:
+    """On the way from A1 to B1, between the fronts at y 1.2 and 2.2, which begin 0.6 m beside it."""
+    flight = replace(evidence([at(0, x_m, 1.7, 1.5)], [status(0)]), site=RACKS)
+    assert score(flight).min_clearance_m == pytest.approx(free_m)
+    assert kinds(flight).get("hit_rack", 0.0) == pytest.approx(-free_m)
+
+
+def test_the_nearest_rack_of_a_large_hall_is_the_nearest_of_all() -> None:
+    """A flight of 20 minutes over the whole hall, at each sample held against each rack alone."""
+    n = np.arange(6000)
+    x_m, y_m = 5.0 + 5.5 * np.sin(n / 150), 31.0 * n / len(n)
+    flown = TrueMotion(n / 5.0, x_m, y_m, 1.5 + 2.0 * np.sin(n / 400), np.zeros(len(n)))
+    alone = [clearances(replace(RACKS, shelves=(shelf,)), flown)[1].free_m for shelf in RACKS.shelves]
+    ceiling, racks = clearances(RACKS, flown)
+    assert (ceiling.obstacle, racks.obstacle) == ("ceiling", "rack")
+    assert racks.free_m == pytest.approx(np.min(alone, axis=0))
+
+
 def test_the_ceiling_and_a_keep_out_are_hit_by_the_body_not_its_centre() -> None:
     assert kinds(evidence([at(0, height_m=5.95)], [status(0)]))["hit_ceiling"] == pytest.approx(0.05)
     hung = replace(SITE, keep_outs=(KeepOut(1.0, -0.2, 2.0, 0.2, from_m=1.65, to_m=2.5),))
@@ -155,8 +182,26 @@ def test_a_drone_left_to_itself_in_the_air_is_out_of_control_unless_it_is_landin
     truth = [at(stamp * 100 * MS) for stamp in range(200)]
     sent = [AttitudeSetpoint(stamp * 20 * MS) for stamp in range(100)]
     assert kinds(evidence(truth, [status(0)], setpoints=sent))["out_of_control"] > 10.0
-    sinking = [replace(t, climb_mps=-0.2) for t in truth]
+    sinking = [replace(t, height_m=5.0 - 0.2 * t.stamp_ns / S) for t in truth]
     assert "out_of_control" not in kinds(evidence(sinking, [status(0)], setpoints=sent))
+
+
+@pytest.mark.parametrize("period_s", [0.5, 2.0, 7.0])
+def test_a_drone_left_to_itself_that_bobs_is_not_landing(period_s: float) -> None:
+    """It falls by up to 0.5 m time and again, and sags by 1 cm/s, but comes back."""
+    sent = [AttitudeSetpoint(stamp * 20 * MS) for stamp in range(100)]
+    turn = math.tau / period_s
+    truth = [
+        at(
+            stamp * 50 * MS,
+            height_m=2.0 + 0.25 * math.cos(turn * stamp / 20) - stamp / 2000,
+            climb=-0.25 * turn * math.sin(turn * stamp / 20),
+        )
+        for stamp in range(500)
+    ]
+    alone_s = score(evidence(truth, [status(0)], setpoints=sent)).uncontrolled_s
+    assert alone_s is not None
+    assert alone_s > 15.0
 
 
 @pytest.mark.parametrize(
@@ -180,6 +225,36 @@ def test_armed_on_the_floor_for_long_and_in_the_air_at_the_end_are_bad() -> None
     assert "stayed_armed" not in kinds(evidence(late, [DONE], armed=[armed, ArmedChange(9 * S, armed=False)]))
     assert kinds(evidence(late, [DONE], armed=[armed]))["stayed_armed"] == pytest.approx(52.0)
     assert kinds(evidence([at(0), at(S)], [DONE]))["stayed_up"] == pytest.approx(1.6)
+
+
+@pytest.mark.parametrize(
+    ("armed_s", "worst_s"),
+    [
+        ([(9.0, 48.0), (60.0, 108.0)], None),
+        ([(0.0, 110.0)], 20.0),
+        ([(0.0, 44.0), (60.0, 110.0)], None),
+        ([(9.0, 60.0), (61.0, 110.0)], 16.0),
+        ([(9.0, 46.0), (47.0, 108.0)], 17.0),
+        ([(9.0, 48.0), (64.0, 200.0)], 16.0),
+    ],
+    ids=["soon", "never disarmed", "a while before", "at the swap", "before it flies on", "at the end"],
+)
+def test_armed_for_long_on_any_floor_is_bad(
+    armed_s: list[tuple[float, float]], worst_s: float | None
+) -> None:
+    """It flies from 10 to 44 s, has its battery changed until 64 s (or is flown on), and flies to 104 s."""
+    flies = [(10.0, 44.0), (64.0, 104.0)]
+    truth = [
+        at(n * S, 0.0, height_m=1.6 if any(up_s <= n < down_s for up_s, down_s in flies) else 0.1)
+        for n in range(121)
+    ]
+    armed = [
+        ArmedChange(round(stamp_s * S), armed=on)
+        for since_s, until_s in armed_s
+        for stamp_s, on in ((since_s, True), (until_s, False))
+    ]
+    found = kinds(evidence(truth, [status(0), status(110 * S, Phase.DONE)], armed=armed))
+    assert found.get("stayed_armed") == (None if worst_s is None else pytest.approx(worst_s))
 
 
 def test_a_hard_touch_down_is_bad() -> None:
@@ -207,6 +282,23 @@ def test_counts_that_are_wrong_are_bad_and_a_flight_without_fault_is_good() -> N
     wrong = judged(good, score(good), codes_wrong=2, empty_wrong=1)
     assert [(fault.kind, fault.value) for fault in wrong] == [("codes_wrong", 2.0), ("empty_wrong", 1.0)]
     assert kinds(replace(good, lost=3)) == {"record_lost": 3.0}
+
+
+def test_a_completed_mission_answers_for_each_place_and_another_end_for_none() -> None:
+    visited = Event(4 * S, EventLevel.INFO, "visited", "A2")
+    flown, statuses = landed(at(S, 0.0), at(4 * S, 1.5), at(7 * S, 0.0)), [status(0, node="A1", goal="A2")]
+    for phase, told in ((Phase.DONE, {"unanswered": 3.0}), (Phase.ABORTED, {"aborted": 1.0})):
+        flight = evidence(flown, [*statuses, replace(DONE, phase=phase)], [visited])
+        found = judged(flight, score(flight), not_looked_at=3)
+        assert {fault.kind: fault.value for fault in found} == told
+
+
+def test_a_node_that_was_not_planned_stands_for_none_that_was() -> None:
+    visited = Event(4 * S, EventLevel.INFO, "visited", "A1")
+    statuses = [status(0, node="A1", goal="A2"), DONE]
+    flown = evidence(landed(at(S, 0.0), at(4 * S, 0.0), at(7 * S, 0.0)), statuses, [visited])
+    assert score(flown).nodes_visited == 0
+    assert kinds(flown)["not_visited"] == 1.0
 
 
 @pytest.mark.parametrize(("x_m", "miscounted"), [(0.95, 0.0), (2.1, 0.0), (2.3, 1.0), (2.7, 1.0)])

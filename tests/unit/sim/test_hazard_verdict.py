@@ -57,6 +57,16 @@ def test_what_a_scenario_tolerates_is_no_fault_of_the_answer_either() -> None:
         assert {fault.kind for fault in found.faults} - {"other_end"} == kinds
 
 
+@pytest.mark.parametrize(("text", "found"), [("lines lost", True), ("lines lost for too long", False)])
+def test_a_hazard_is_not_found_by_another_whose_name_begins_alike(text: str, found: bool) -> None:
+    (row,) = (row for row in HAZARDS if row.name == "lines_lost")
+    told = Event(12 * S, EventLevel.WARNING, "hazard", f"{text}: hold")
+    flight = evidence(landed(*(at(second * S) for second in range(1, 31))), [status(0)], [told])
+    expected = Expectation(hazard=row.name, ends="landed")
+    verdict = judged_hazard(row, expected, flight, score(flight), [], [10 * S])
+    assert verdict.found_s == (2.0 if found else None)
+
+
 FLOWN = [at(second * S) for second in range(1, 31)]
 ENDS: dict[str, tuple[Phase, list[Kinematics]]] = {
     "completed": (Phase.DONE, landed(*FLOWN)),

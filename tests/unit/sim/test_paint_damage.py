@@ -13,7 +13,7 @@ from flightd.sim.floor.paint_damage import UNDAMAGED, PaintDamage, drawn_damage,
 from flightd.sim.floor.texture import Box
 from flightd.sim.random_sites import random_site
 from flightd.sim.unknowns import NOTHING, SPREADS, WorldKind, unknowns_of
-from flightd.site.site import Site
+from flightd.site.site import Side, Site
 from flightd.site.site_file import load_site
 
 DEMO = load_site(shipped("site-demo.toml"))
@@ -52,6 +52,17 @@ def test_as_much_of_the_demo_floor_is_damaged_as_its_world_says(seed: int) -> No
     check_shares(DEMO, damage)
     assert damage.pallets or damage.gratings
     assert damage == drawn_damage(DEMO, GONE, COVERED, FALSE, seed)
+
+
+def test_what_lies_about_lies_before_the_fronts_of_racks_but_never_in_them() -> None:
+    """Between aisles A and B racks stand back to back from 1.2 to 1.8 m."""
+    (x0_m, x1_m), *_ = [(s.x0_m, s.x1_m) for s in DEMO.shelves if s.aisle == "B" and s.side is Side.LEFT]
+    rack, before = (x0_m, 1.2, x1_m, 1.8), (x0_m, 1.8, x1_m, 2.1)
+    drawn = [
+        stripe.box() for seed in range(30) for stripe in drawn_damage(DEMO, 0.0, 0.0, 0.1, seed).false_lines
+    ]
+    assert all(apart(box, rack) for box in drawn)
+    assert not all(apart(box, before) for box in drawn)
 
 
 @given(seeds, seeds)

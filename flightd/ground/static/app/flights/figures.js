@@ -78,9 +78,10 @@ const FAULTS = {
   hit_rack: english("hit rack"), hit_ceiling: english("hit ceiling"), hit_keep_out: english("hit keep out"),
   left_leg: english("left leg"), too_high: english("too high"), out_of_control: english("out of control"),
   hard_landing: english("hard landing"), leaned_on_floor: english("leaned on floor"), stayed_up: english("stayed up"),
-  stayed_armed: english("stayed armed"), aborted: english("aborted"), miscounted: english("miscounted"),
-  not_visited: english("not visited"), off_pad: english("off pad"), codes_wrong: english("codes wrong"),
-  empty_wrong: english("empty wrong"), not_found: english("not found"), found_late: english("found late"),
+  stayed_armed: english("stayed armed"), record_lost: english("record lost"), truth_lost: english("truth lost"),
+  aborted: english("aborted"), miscounted: english("miscounted"), not_visited: english("not visited"),
+  off_pad: english("off pad"), codes_wrong: english("codes wrong"), empty_wrong: english("empty wrong"),
+  unanswered: english("places unanswered"), not_found: english("not found"), found_late: english("found late"),
   other_action: english("other action"), other_end: english("other end"), down_late: english("down late"),
 };
 export const faultWords = (row) => row.faults.map((kind) => say(FAULTS[kind] ?? kind.replaceAll("_", " "))).join(", ");
