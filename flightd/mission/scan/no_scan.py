@@ -112,6 +112,9 @@ class NoScan:
     def home(self, certain: bool) -> None:
         """Nothing is proven."""
 
+    def end(self, now_ns: int) -> None:
+        """Nothing was to be counted."""
+
     def doubt(self) -> None:
         """Nothing is kept back."""
 

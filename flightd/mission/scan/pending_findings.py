@@ -83,6 +83,11 @@ class PendingFindings:
         self._nodes.clear()
         return codes
 
+    def again(self, node: str) -> None:
+        """This node is due again, as one whose findings were withdrawn."""
+        if node not in self._due:
+            self._due.append(node)
+
     def take_due(self) -> tuple[str, ...]:
         """The nodes to fly to once more, in the order of their first visit."""
         due = [node for node in self._due if self._again[node] < self._revisits]

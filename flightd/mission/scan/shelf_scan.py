@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from flightd.core.types import Event, Phase
+from flightd.core.types import OVER, Event, Phase
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.plan.flight_plan import Stop
 from flightd.mission.plan.sweep_leg import SweepLeg
@@ -142,6 +142,8 @@ class ShelfScan:
             self._lead_sweep(s, phase, trigger, stop)
         if trigger is Trigger.ROUTE_DONE:
             scanner.home(certain)
+        if phase in OVER or trigger is Trigger.DOWN_AS_TOLD:
+            scanner.end(s.now_ns)
 
     def _lead_sweep(self, s: MissionInputs, phase: Phase, trigger: Trigger, stop: Stop) -> None:
         """Pictures count from the beginning of a leg until the next one's, but for interruptions."""
