@@ -29,6 +29,7 @@ class NoScan:
     looking = False
     looks = 0
     sweeps = False
+    unproven = ()
     evidence: frozenset[str] = frozenset()
 
     def wants(self, _node: str) -> bool:

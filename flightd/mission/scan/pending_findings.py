@@ -83,6 +83,13 @@ class PendingFindings:
         self._nodes.clear()
         return codes
 
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Those whose findings are not proven yet, and those that are due again, in the order of their first
+        visit as far as it is known."""
+        pending = (at.node for at in self._nodes if at.locations)
+        return tuple(dict.fromkeys((*pending, *self._due, *self._recalled)))
+
     def again(self, node: str) -> None:
         """This node is due again, as one whose findings were withdrawn."""
         if node not in self._due:

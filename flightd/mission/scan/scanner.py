@@ -176,7 +176,11 @@ class Scanner:
     def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
         """Begin or continue the scan of a node that is reached."""
         self.leave()
-        views = [self._lit(view) for view in self._planner.views(node, self._left(node), height_m, yaw_rad)]
+        views = [
+            # with the exposure that was right when its rack front was flown past
+            replace(view, exposure=self._exposure.of_places(view.locations))
+            for view in self._planner.views(node, self._left(node), height_m, yaw_rad)
+        ]
         relights = not self._exposure.fixed
         self._task = ScanTask(node, views, self._planner, self._params, relights, self._passed)
         self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
@@ -208,10 +212,6 @@ class Scanner:
         if over:
             self._events += self._unanswered.note(self._task, now_ns)
         return over
-
-    def _lit(self, view: View) -> View:
-        """With the exposure that was right when its rack front was flown past."""
-        return replace(view, exposure=self._exposure.of_places(view.locations))
 
     def leave(self) -> None:
         """The node is left; what was not decided there stays to count."""
@@ -265,6 +265,11 @@ class Scanner:
         picture having come there, in the order of their first visit; each at most `revisits` times in a
         flight."""
         return tuple(node for node in self._pending.take_due() if self._left(node))
+
+    @property
+    def unproven(self) -> tuple[str, ...]:
+        """The nodes that another flight has to count where this one ends now, though it visited them."""
+        return self._pending.nodes
 
     # Counting in passing
 
@@ -335,10 +340,7 @@ class Scanner:
             return
         self._sweep.end()
         self._gather_sweep()
-        why = self._sweep.why
-        left = ", ".join(f"{count} {reason}" for reason, count in sorted(why.items()))
-        text = f"{why.total()} places to stop before" + (f": {left}" if left else "")
-        self._events.append(Event(now_ns, EventLevel.INFO, "swept", text))
+        self._events.append(Event(now_ns, EventLevel.INFO, "swept", self._sweep.outcome))
         self._events += self._exposure.drain_events(now_ns)
         self._sweep = None
 
