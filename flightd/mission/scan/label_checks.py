@@ -52,9 +52,11 @@ class LabelChecks:
         for location in locations:
             self._dismissed.pop(location, None)
 
-    def trust(self) -> None:
-        """The place is known again; labels that still contradict it hang wrong."""
-        self._dismissed |= self._contradicting
+    def trust(self, *, moved: bool) -> None:
+        """The place is known again: another one (`moved`), and the labels were right, or the same, and those
+        that contradict it hang wrong."""
+        if not moved:
+            self._dismissed |= self._contradicting
         self._contradicting.clear()
 
     def _is_dismissed(self, seen: Sighting) -> bool:

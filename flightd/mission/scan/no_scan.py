@@ -122,7 +122,7 @@ class NoScan:
     def withdraw(self, now_ns: int, reason: str) -> None:
         """Nothing is taken back."""
 
-    def trust(self) -> None:
+    def trust(self, *, moved: bool = False) -> None:
         """Nothing was doubted."""
 
     def take_due(self) -> tuple[str, ...]:

@@ -255,10 +255,10 @@ class Scanner:
             self._gather_sweep()
         self._passed.clear()
 
-    def trust(self) -> None:
-        """The place is known again; labels that still contradict it hang wrong."""
+    def trust(self, *, moved: bool = False) -> None:
+        """The place is known again, `moved`: as another one; else labels that contradict it hang wrong."""
         self.doubted = False
-        self._labels.trust()
+        self._labels.trust(moved=moved)
 
     def take_due(self) -> tuple[str, ...]:
         """The nodes with something to count to fly to once more, their findings having been withdrawn or no

@@ -121,9 +121,10 @@ class ShelfScan:
         if trigger is Trigger.POSITION_DOUBTED:
             scanner.doubt()
         elif trigger is Trigger.POSITION_SURE:
-            if shift_m >= _SAME_SHARE * self._apart_m:
+            moved = shift_m >= _SAME_SHARE * self._apart_m
+            if moved:
                 scanner.withdraw(s.now_ns, f"the position was {shift_m:.2f} m off")
-            scanner.trust()
+            scanner.trust(moved=moved)
         elif phase in _ENDS and scanner.doubted:
             scanner.withdraw(s.now_ns, "the position was not found again")
         elif trigger is Trigger.ARRIVED:
