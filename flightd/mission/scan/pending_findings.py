@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from flightd.core.scanning import Settled
+from flightd.core.types import Event, EventLevel
 
 
 @dataclass(slots=True)
@@ -104,8 +105,19 @@ class PendingFindings:
         self._recalled.clear()
         return tuple(due)
 
+    def tell(self, now_ns: int) -> list[Event]:
+        """What is not proven at the end: it stays pending in the inventory."""
+        findings = sum(len(at.locations) for at in self._nodes)
+        if not findings:
+            return []
+        nodes = ", ".join(at.node for at in self._nodes if at.locations)
+        text = f"{findings} findings are not proven and stay pending, at {nodes}"
+        return [Event(now_ns, EventLevel.WARNING, "unproven", text)]
+
     def begin(self) -> None:
-        """Another flight: no node of the one before is due, and each may be again."""
+        """Another flight: its way proves nothing that was found before, no node is due, and each may be
+        again."""
+        self._nodes.clear()
         self._due.clear()
         self._recalled.clear()
         self._again.clear()

@@ -229,8 +229,8 @@ class Scanner:
             self._pending.confirm_all(self._present)
 
     def end(self, now_ns: int) -> None:
-        """The flight is over: what of its count is not as it should be."""
-        self._events += self._unanswered.tell(self._done, now_ns)
+        """The flight is over: tell what has no answer, and what is not proven."""
+        self._events += (*self._unanswered.tell(self._done, now_ns), *self._pending.tell(now_ns))
 
     def doubt(self) -> None:
         """The place may be another one: assign nothing, and keep what is pending, until `trust`."""
@@ -354,9 +354,7 @@ class Scanner:
     @property
     def looking(self) -> bool:
         """Whether the front camera's pictures are wanted now."""
-        if self._passing is not None:
-            return True
-        return self._task is not None and bool(self._task.looking)
+        return self._passing is not None or (self._task is not None and bool(self._task.looking))
 
     def places(self, pose: BodyPose) -> tuple[Place, ...]:
         """The places wanted in a picture taken at `pose`; none for one that would not count."""

@@ -73,6 +73,7 @@ def test_what_no_picture_shows_is_told_and_not_looked_for_again(shown: int) -> N
 def test_a_scan_that_answers_everything_has_nothing_to_tell() -> None:
     hover = Hover()
     hover.run(GOODS, {code: (f"{code} P",) for code in LOCATIONS})
+    hover.scanner.home(certain=True)
     hover.scanner.end(hover.now_ns)
     assert hover.scanner.drain_events() == []
     assert hover.scanner.take_due() == ()

@@ -302,6 +302,8 @@ export default {
   "no picture came": "es kam kein Bild",
   "no picture showed them": "kein Bild zeigte sie",
   "{n} places that were to be counted have no answer, at {nodes}": "{n} Plätze, die zu zählen waren, sind ohne Antwort, an {nodes}",
+  "{n} findings are not proven and stay pending, at {nodes}": "{n} Befunde sind nicht belegt und bleiben vorläufig, an {nodes}",
+  "its place was not certain down to the pad": "sein Ort war bis auf den Landeplatz hinab nicht sicher",
   "{places} places to stop before": "vor {places} Plätzen zu halten",
   "aisle {aisle} {side}, level {level}: taken with {part} times the usual light": "Gang {aisle} {side}, Ebene {level}: aufgenommen mit dem {part}fachen des üblichen Lichts",
   "the front camera does not support exposure control: what is lit wrongly stays unreadable": "die Frontkamera lässt ihre Belichtung nicht stellen: Was falsch beleuchtet ist, bleibt unlesbar",
