@@ -74,7 +74,7 @@ def prepare(config: Config, path: Path, *, resume: bool, taken_back: str = "") -
         )
     site = load_site(config.mission.site)
     anew = service.was_started_before(os.environ)
-    order = resumed(configured_order(config), config, path, site, wanted=resume)
+    order = resumed(configured_order(config), config, path, site, wanted=resume, in_air=anew)
     order = going_on(order, config.inventory.run, site, config.inventory.folder, in_air=anew)
     if anew:  # it looks after what flies, and never starts a flight by itself
         order = replace(order, autostart=False)
