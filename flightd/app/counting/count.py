@@ -11,6 +11,7 @@ from flightd.app.counting.text_searcher import TextSearcher
 from flightd.app.flight import Tasks
 from flightd.core.scanning import CodeSet, CountedPlace, Finding, Place
 from flightd.core.tick import TickOutput
+from flightd.core.told_codes import told_codes
 from flightd.ports import Ground
 from flightd.runtime.frame_ring import FrameTicket
 
@@ -115,7 +116,7 @@ class Counting:
                 "node": finding.node,
                 "state": finding.state.value,
                 "standing": "confirmed" if location in self._confirmed else "pending",
-                "texts": " ".join(dict.fromkeys(read.text for read in finding.reads)),
+                **told_codes(read.text for read in finding.reads),
             }
             for location, finding in sorted(self._findings.items())
         )
