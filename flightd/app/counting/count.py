@@ -12,6 +12,7 @@ from flightd.app.flight import Tasks
 from flightd.core.scanning import CodeSet, CountedPlace, Finding, Place
 from flightd.core.tick import TickOutput
 from flightd.core.told_codes import told_codes
+from flightd.core.types import Phase
 from flightd.ports import Ground
 from flightd.runtime.frame_ring import FrameTicket
 
@@ -39,6 +40,7 @@ class Counting:
         self._counted = counted
         self._findings: dict[str, Finding] = {}
         self._confirmed: set[str] = set()
+        self._takes_off = False
 
     def read_for(
         self, places: Callable[[int], tuple[Place, ...]], evidence: Callable[[], Collection[str]]
@@ -77,6 +79,10 @@ class Counting:
 
     def keep(self, output: TickOutput) -> None:
         """Hand a tick's findings to the inventory."""
+        takes_off = output.phase is Phase.TAKE_OFF
+        if takes_off and not self._takes_off and self._writer is not None:
+            self._writer.take_off()
+        self._takes_off = takes_off
         for finding in output.findings:
             self._findings[finding.location] = finding
             self._confirmed.discard(finding.location)
