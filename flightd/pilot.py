@@ -85,6 +85,13 @@ class Pilot:
         return self._mission
 
     @property
+    def left_over(self) -> tuple[str, ...]:
+        """The stops for a flight that goes on with this one, in order: first what was visited and would not
+        count if this one ended now."""
+        remaining = self._mission.remaining
+        return (*(node for node in self._scanner.unproven if node not in remaining), *remaining)
+
+    @property
     def scanner(self) -> AnyScanner:
         """What counts the shelves."""
         return self._scanner

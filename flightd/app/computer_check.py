@@ -12,7 +12,7 @@ from flightd.core.refusal import Refusal
 from flightd.doctor.calibration import check_calibration
 from flightd.doctor.check import Check, CheckLevel, FailedChecks
 from flightd.doctor.labels import check_labels
-from flightd.doctor.machine import check_clock, check_disk, check_processor
+from flightd.doctor.machine import check_clock, check_count_clock, check_disk, check_processor
 from flightd.site.site import Site
 
 PERIOD_S = 10.0
@@ -34,10 +34,12 @@ def look_at_machine(config: Config) -> list[Check]:
     return [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
 
 
-def look_here(config: Config, site: Site) -> list[Check]:
-    """All that can be looked at without moving or asking anything.  Blocks for the disk."""
+def look_here(config: Config, site: Site, newest_ns: int = 0) -> list[Check]:
+    """All that can be looked at without moving or asking anything; `newest_ns` is the UTC of the inventory's
+    newest look.  Blocks for the disk."""
     return [
         *look_at_machine(config),
+        *check_count_clock(newest_ns),
         *check_calibration(config.camera, site, config.mission.height_m),
         *check_labels(config, site),
     ]

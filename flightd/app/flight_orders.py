@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,8 @@ from flightd.core.errors import InputError, UnavailableError
 from flightd.core.flight_order import FlightOrder
 from flightd.core.geometry import wrap_pi
 from flightd.site.site import Site
+
+_LOG = logging.getLogger(__name__)
 
 
 def configured_order(config: Config) -> FlightOrder:
@@ -32,8 +35,8 @@ def resumed(
     order: FlightOrder, config: Config, path: Path, site: Site, *, wanted: bool, in_air: bool = False
 ) -> FlightOrder:
     """The order with the stops left over by the last flight in place of its own, if `wanted` or configured
-    in the file `path`.  InputError when nothing can be resumed that is wanted, but not where the vehicle may
-    be `in_air` already."""
+    in the file `path`.  InputError when nothing can be resumed that is wanted, or the file is none; not where
+    the flight may be `in_air` already (the daemon was started anew): then the order stays as it is."""
     kept = config.mission.progress
     if wanted and kept is None and not in_air:
         raise InputError(f"config {path}: mission.progress names no file, so that nothing can be resumed")
@@ -42,10 +45,12 @@ def resumed(
     try:
         left = load_left_over(kept, site)
     except InputError as err:
-        finished = isinstance(err, NothingLeftError) and not wanted
-        if not (finished or in_air):
-            raise
-        return order  # the last flight was finished: a new one begins
+        if in_air:
+            _LOG.warning("%s", err)
+            return order
+        if isinstance(err, NothingLeftError) and not wanted:
+            return order  # the last flight was finished: a new one begins
+        raise
     return replace(
         order,
         nodes=left.remaining,

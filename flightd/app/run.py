@@ -174,7 +174,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
             keep_files=True,
             opener=open_paced_datagrams,
             startup_fault=faults.first,
-            fitness=ComputerCheck(partial(look_here, config, site)),
+            fitness=ComputerCheck(partial(look_here, config, site, count.newest_ns)),
         )
         daemon, maintainer.flight = Daemon(flight), flight
         if run.taken_back:

@@ -104,7 +104,7 @@ class Tick:
     def _keep(self) -> None:
         """What is to last beyond the daemon's end."""
         pilot = self._flight.pilot
-        self._flight.progress.put(LeftOver(pilot.mission.remaining, *pilot.mission.stand))
+        self._flight.progress.put(LeftOver(pilot.left_over, *pilot.mission.stand))
         if pilot.learnt is not None:
             self._flight.learnt.put(pilot.learnt)
 

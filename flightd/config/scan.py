@@ -44,7 +44,10 @@ class ScanExpert(Section):
         json_schema_extra=unit("probability"),
     )
     revisits: int = Field(
-        2, ge=0, le=10, description="most times that a node is flown to again, its findings withdrawn"
+        2,
+        ge=0,
+        le=10,
+        description="most times that a node is flown to again, its findings withdrawn or no picture come",
     )
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from flightd.config.recorder import RecorderConfig
 from flightd.core.processors import usable_cores
+from flightd.core.utc_time import utc_text
 from flightd.doctor.check import Check, error, ok, unseen, warning
 
 _TICK_RESOLUTION_S = 0.001
@@ -62,6 +63,21 @@ def judge_clock(resolution_s: float, year: int, *, synchronised: bool | None) ->
         text = "nothing keeps the date right"
         return warning("clock", text, "run systemd-timesyncd or chrony: logs and signed links need it")
     return ok("clock", "monotonic in fine steps, date synchronised")
+
+
+def check_count_clock(newest_ns: int) -> list[Check]:
+    """Whether the date lies before the newest look of the inventory (UTC; 0: none): of the looks at a place
+    the one with the newest date counts, which would hide what is counted now."""
+    return judge_count_clock(time.time_ns(), newest_ns)
+
+
+def judge_count_clock(now_ns: int, newest_ns: int) -> list[Check]:
+    if now_ns >= newest_ns:
+        return []
+    now, newest = utc_text(now_ns), utc_text(newest_ns)
+    text = f"the inventory has a look of {newest}, and this computer's clock says {now}"
+    remedy = "set the clock, or begin another inventory.folder: what is counted now would be taken for older"
+    return [error("inventory clock", text, remedy)]
 
 
 def _is_synchronised() -> bool | None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from flightd.core.inventory import LocationRecord, Observation, Standing
+from flightd.core.told_codes import codes_of
 
 Look: TypeAlias = tuple[Observation, Standing]
 
@@ -70,8 +71,5 @@ def view_of_told(told: dict[str, str]) -> PlaceView:
         state = ShownState(told.get("state", ""))
     except ValueError:
         state = ShownState.NOT_VISITED
-    text = told.get("texts", "")
-    texts = (text,) if state is ShownState.READ else tuple(text.split())
-    return PlaceView(
-        told.get("location", ""), state, texts if text else (), pending=told.get("standing") == "pending"
-    )
+    pending = told.get("standing") == "pending"
+    return PlaceView(told.get("location", ""), state, codes_of(told), pending=pending)

@@ -11,6 +11,8 @@ from flightd.app.counting.text_searcher import TextSearcher
 from flightd.app.flight import Tasks
 from flightd.core.scanning import CodeSet, CountedPlace, Finding, Place
 from flightd.core.tick import TickOutput
+from flightd.core.told_codes import told_codes
+from flightd.core.types import Phase
 from flightd.ports import Ground
 from flightd.runtime.frame_ring import FrameTicket
 
@@ -38,6 +40,7 @@ class Counting:
         self._counted = counted
         self._findings: dict[str, Finding] = {}
         self._confirmed: set[str] = set()
+        self._takes_off = False
 
     def read_for(
         self, places: Callable[[int], tuple[Place, ...]], evidence: Callable[[], Collection[str]]
@@ -76,6 +79,10 @@ class Counting:
 
     def keep(self, output: TickOutput) -> None:
         """Hand a tick's findings to the inventory."""
+        takes_off = output.phase is Phase.TAKE_OFF
+        if takes_off and not self._takes_off and self._writer is not None:
+            self._writer.take_off()
+        self._takes_off = takes_off
         for finding in output.findings:
             self._findings[finding.location] = finding
             self._confirmed.discard(finding.location)
@@ -115,7 +122,7 @@ class Counting:
                 "node": finding.node,
                 "state": finding.state.value,
                 "standing": "confirmed" if location in self._confirmed else "pending",
-                "texts": " ".join(dict.fromkeys(read.text for read in finding.reads)),
+                **told_codes(read.text for read in finding.reads),
             }
             for location, finding in sorted(self._findings.items())
         )

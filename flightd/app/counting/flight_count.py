@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Callable
 from contextlib import AsyncExitStack, ExitStack, nullcontext
 from pathlib import Path
@@ -11,12 +10,13 @@ from pathlib import Path
 from flightd.adapters.store.sqlite import SqliteStore
 from flightd.app.counting.code_readers import ReaderPool, Readers
 from flightd.app.counting.count import Counting
-from flightd.app.counting.store_writer import StoreWriter, nobody
+from flightd.app.counting.store_writer import StoreWriter, nobody, utc_at_zero_ns
 from flightd.app.counting.text_searcher import TextSearcher
 from flightd.config.schema import Config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import PlannedLocation
 from flightd.core.scanning import CountedPlace
+from flightd.doctor.machine import check_count_clock
 from flightd.mission.plan.flight_plan import counts_shelves
 from flightd.ports import Clock
 from flightd.runtime.clock import Hold
@@ -46,6 +46,8 @@ class FlightCount:
         self._store: SqliteStore | None = None
         self._run = run
         self._counted: tuple[CountedPlace, ...] = ()
+        self.newest_ns = 0
+        """UTC of the newest look that the inventory had before this flight; 0 without one."""
         self.error: FlightdError | None = None
         self.scans = counts_shelves(config, site)
         if not self.scans or folder is None:
@@ -56,6 +58,9 @@ class FlightCount:
             if not in_air:
                 raise
             self.error = err
+        if in_air:  # on the ground nothing starts before that is put right
+            for check in check_count_clock(self.newest_ns):
+                _LOG.warning("%s; %s", check.text, check.remedy)
 
     def _opened(self, folder: Path, site: Site) -> tuple[SqliteStore, tuple[CountedPlace, ...]]:
         """The store, ready for this flight, and what is counted already."""
@@ -65,7 +70,7 @@ class FlightCount:
             planned = (PlannedLocation(place.code, place.node, place.pallets_deep) for place in places)
             store.plan(planned, site.name)
             store.withdraw_pending(self._run)
-            counted = store.counted(self._run)
+            counted, self.newest_ns = store.counted(self._run), store.newest_ns()
             self._stack.callback(opened.pop_all().close)
         return store, counted
 
@@ -86,12 +91,11 @@ class FlightCount:
         writer, texts = None, None
         if self._store is not None:
             texts = self._text_searcher(self._store, hold)
-            utc_at_zero_ns = time.time_ns() - clock.now_ns()
             writer = self._stack.enter_context(
                 StoreWriter(
                     self._store,
                     self._run,
-                    utc_at_zero_ns,
+                    utc_at_zero_ns(clock),
                     clock,
                     _LOG.warning,
                     hold,

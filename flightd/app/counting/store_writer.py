@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -27,6 +28,11 @@ def _is_empty(finding: Finding) -> bool:
 
 def nobody(_observation: str, _jpeg: bytes) -> None:
     """Nobody wants to know."""
+
+
+def utc_at_zero_ns(clock: Clock) -> int:
+    """UTC at the clock's zero, by the date that the computer has now."""
+    return time.time_ns() - clock.now_ns()
 
 
 class StoreWriter:
@@ -90,6 +96,11 @@ class StoreWriter:
             jpeg = b""
         if self._add((finding, jpeg)):
             self._pictures += bool(jpeg)
+
+    def take_off(self) -> None:
+        """A flight begins: date what it finds by the computer's date as it is now, and never before what was
+        found earlier: of two looks at a place the one with the newer date counts."""
+        self._utc_at_zero_ns = max(self._utc_at_zero_ns, utc_at_zero_ns(self._clock))
 
     def settle(self, settled: Settled) -> None:
         """Confirm or withdraw what was put before."""

@@ -8,6 +8,7 @@ import typer
 
 from flightd.cli.ctl.connection import DaemonConnection
 from flightd.cli.options import AsJson
+from flightd.core.told_codes import LISTED
 
 
 def register(app: typer.Typer) -> None:
@@ -29,5 +30,5 @@ def inventory(context: typer.Context, as_json: AsJson = False) -> None:
         print(json.dumps({"places": places}))
         return
     for place in places:
-        print("  ".join(place.values()))
+        print("  ".join(text for name, text in place.items() if name != LISTED))
     print(f"{len(places)} places")

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from flightd.adapters.ground_link.messages.counts import Counts, NodeCount
 from flightd.adapters.ground_link.messages.published import EventReport, StatusReport
 from flightd.core.errors import FlightdError, InputError
+from flightd.core.told_codes import codes_of
 from flightd.fleet.vda5050.order import Order
 from flightd.fleet.vda5050.parts import Action
 from flightd.fleet.vda5050.state import ActionStatus
@@ -168,9 +169,9 @@ def counted_in_words(rows: Iterable[dict[str, str]], node: str, scan: ScanShelf)
     here = [row for row in rows if row.get("node") == node and _is_asked(row, scan)]
     if not here:
         return None
-    read = [row["texts"] for row in here if row.get("texts")]
+    read = [codes for row in here if (codes := codes_of(row))]
     told = f"{len(read)} of {len(here)} places with codes"
-    missing = [code for code in scan.expected or () if not any(code in text.split(" ") for text in read)]
+    missing = [code for code in scan.expected or () if not any(code in codes for codes in read)]
     return f"{told}; not read: {', '.join(missing)}" if missing else told
 
 

@@ -1,7 +1,8 @@
-"""Votes of many frames on what a code says: believed when a checksum vouches or two whole reads agree.
+"""Votes of many frames on what a code says: it counts when a checksum vouches or two frames agree.
 
-Frames that show the same label are no independent witnesses: what may be a part of a longer code is misread
-alike in each of them, and counts in none."""
+Looks at one frame are the same pixels, scaled and turned: that several of them agree makes a code a rival of
+what else is read there, and no second witness.  Nor are frames of one label independent where what they show
+may be a part of a longer code: it is misread alike in each of them, and counts in none."""
 
 from __future__ import annotations
 
@@ -57,9 +58,9 @@ class CodeVotes:
         return len(self._frames.get((placed.read.symbology, placed.read.text), ()))
 
     def believed(self) -> tuple[PlacedRead, ...]:
-        """One read for each code that is believed, the most often seen first; `agreeing` counts frames
-        (or the looks at one frame, where those were more)."""
-        believed = (placed for placed in self._counted() if placed.read.believed)
+        """One read for each code that is believed, be it for the looks at one frame alone, the most often
+        seen first; `agreeing` counts the frames that gave it whole."""
+        believed = (self._by_frames(placed) for placed in self._counted() if placed.read.believed)
         return tuple(sorted(believed, key=lambda placed: (-placed.read.agreeing, placed.read.text)))
 
     def seen(self) -> tuple[SeenRead, ...]:
@@ -69,10 +70,13 @@ class CodeVotes:
         )
 
     def _counted(self) -> Iterator[PlacedRead]:
-        """The best read of each code, `agreeing` as in `believed`."""
+        """The best read of each code; `agreeing` counts frames, or the looks at one where those were more."""
         for code, placed in self._codes.items():
             agreeing = max(len(self._frames[code]), placed.read.agreeing)
             yield replace(placed, read=replace(placed.read, agreeing=agreeing))
+
+    def _by_frames(self, placed: PlacedRead) -> PlacedRead:
+        return replace(placed, read=replace(placed.read, agreeing=self.frames(placed)))
 
 
 def _merged(known: PlacedRead, newest: PlacedRead) -> PlacedRead:

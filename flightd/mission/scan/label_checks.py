@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from flightd.mission.scan.code_assignment import Sighting
+from flightd.core.types import Event, EventLevel
+from flightd.mission.scan.code_assignment import ShelfLook, Sighting
 
 _SAME_OFF_M = 0.3
 """A label seen so near to where it was found to hang wrong still hangs there."""
@@ -24,11 +25,20 @@ class LabelChecks:
         """Labels contradict the place, and it has not been trusted since."""
         return bool(self._contradicting)
 
-    def new_unmapped(self, texts: Iterable[str]) -> list[str]:
-        """Those of the labels without a place on the map that were not seen before."""
-        new = [text for text in dict.fromkeys(texts) if text not in self._unmapped]
+    def unknown(self, look: ShelfLook, where: str) -> list[Event]:
+        """The labels in a picture taken at `where` that are not on the map, each told once."""
+        new = [text for text in dict.fromkeys(look.unmapped) if text not in self._unmapped]
         self._unmapped.update(new)
-        return new
+        told = "is not on the map: not counted as stock"
+        return [
+            Event(
+                look.pose.stamp_ns,
+                EventLevel.WARNING,
+                "unknown_location",
+                f"label {text}, seen from {where}, {told}",
+            )
+            for text in new
+        ]
 
     def against(self, sightings: Iterable[Sighting]) -> Sighting | None:
         """The first of these labels to contradict the place; all that do are kept."""
@@ -42,9 +52,11 @@ class LabelChecks:
         for location in locations:
             self._dismissed.pop(location, None)
 
-    def trust(self) -> None:
-        """The place is known again; labels that still contradict it hang wrong."""
-        self._dismissed |= self._contradicting
+    def trust(self, *, moved: bool) -> None:
+        """The place is known again: another one (`moved`), and the labels were right, or the same, and those
+        that contradict it hang wrong."""
+        if not moved:
+            self._dismissed |= self._contradicting
         self._contradicting.clear()
 
     def _is_dismissed(self, seen: Sighting) -> bool:

@@ -19,6 +19,8 @@ class LegExposure:
         self._site = site
         self._light = FaceLight(params.expert.darker, params.expert.brighter, params.sweep.most_gain)
         self._shot = USUAL
+        self.fixed = False
+        """The camera was told to be exposed as it is."""
 
     @property
     def taken_with(self) -> tuple[float, float]:
@@ -35,9 +37,14 @@ class LegExposure:
         """Whether the camera has not shown that it is exposed as it is."""
         return self._light.follows
 
-    def fix(self) -> None:
-        """The camera is exposed as it is."""
+    def fix(self, now_ns: int) -> list[Event]:
+        """The camera has shown that it is exposed as it is; what is to be said of that, once."""
+        if self.fixed:
+            return []
+        self.fixed = True
         self._light.fix()
+        text = "the front camera does not support exposure control: what is lit wrongly stays unreadable"
+        return [Event(now_ns, EventLevel.WARNING, "exposure_fixed", text)]
 
     def of_places(self, codes: Iterable[str]) -> float:
         """The exposure that was right when the fronts of these places were flown past."""

@@ -18,6 +18,8 @@ _LEAST_SHARE = 0.6
 _WHOLE_SHARE = 0.9
 """Part that one picture at least must show before no further ones are needed: what is cut off may hold a
 second label."""
+_LEAST_FRAMES = 2
+"""Frames that must agree on what a code says."""
 _SAME_LABEL = 0.5
 """Two codes nearer to each other than this part of their size are one label."""
 _LEAST_EMPTY = 2
@@ -79,6 +81,11 @@ class LocationVotes:
         return self._votes.only_parts
 
     @property
+    def torn(self) -> bool:
+        """Whether one label was read as different texts."""
+        return self._believed()[1]
+
+    @property
     def any_goods(self) -> bool:
         """Whether the place is not empty whatever its middle shows: a code was read here, or most pictures
         show goods in its opening."""
@@ -87,7 +94,8 @@ class LocationVotes:
     @property
     def exhausted(self) -> bool:
         """More pictures from the same place would show no more: codes are read, the rest is cut off."""
-        return self.looks >= self._least and self._quiet >= 2 and bool(self._votes.believed())
+        read = any(map(_counts, self._votes.believed()))
+        return self.looks >= self._least and self._quiet >= 2 and read
 
     def add(
         self, frame_seq: int, pose: BodyPose, place: PlaceLook | None, reads: Sequence[PlacedRead]
@@ -125,6 +133,8 @@ class LocationVotes:
             settled = self._enough and self._quiet >= 2 and self._agreed(believed)
             if not (settled or final):
                 return None
+            believed = tuple(filter(_counts, believed))
+        if believed:
             return self._with_codes(believed, self._undecided(believed, others), self._pose)
         if self._is_empty(final):
             return self._found(LocationState.EMPTY, SEEN_EMPTY, self._pose)
@@ -151,7 +161,7 @@ class LocationVotes:
 
     @staticmethod
     def _agreed(believed: Sequence[PlacedRead]) -> bool:
-        return all(placed.read.agreeing >= 2 for placed in believed)
+        return all(placed.read.agreeing >= _LEAST_FRAMES for placed in believed)
 
     def _with_codes(
         self, believed: Sequence[PlacedRead], undecided: tuple[UndecidedCode, ...], pose: BodyPose
@@ -159,7 +169,7 @@ class LocationVotes:
         several = len({placed.read.text for placed in believed}) > 1
         confidence = min(
             placed.probability
-            * (_SURE_TEXT if placed.read.sure and placed.read.agreeing >= 2 else _AGREED_TEXT)
+            * (_SURE_TEXT if placed.read.sure and placed.read.agreeing >= _LEAST_FRAMES else _AGREED_TEXT)
             for placed in believed
         )
         state = LocationState.SEVERAL if several else LocationState.READ
@@ -205,7 +215,7 @@ class LocationVotes:
         )
 
     def _believed(self) -> tuple[tuple[PlacedRead, ...], bool]:
-        """The reads that count, and whether one label was read as different texts: then none counts."""
+        """The reads that may count, and whether one label was read as different texts: then none does."""
         believed = self._votes.believed()
         often = [one for one in believed if one.read.sure and self._votes.frames(one) >= self._least]
         believed = tuple(one for one in believed if not any(self._is_slip(one, other) for other in often))
@@ -220,6 +230,11 @@ class LocationVotes:
         single one: half of an EAN-13 that the picture's edge cuts off is a UPC-E by its bars."""
         once = not one.read.sure and self._votes.frames(one) == 1
         return once and one.read.text != other.read.text and _is_one_label(one, other)
+
+
+def _counts(placed: PlacedRead) -> bool:
+    """Whether a believed read is a finding: one frame alone is no proof of what no checksum vouches for."""
+    return placed.read.sure or placed.read.agreeing >= _LEAST_FRAMES
 
 
 def _lies_on(doubtful: PlacedRead, label: PlacedRead) -> bool:

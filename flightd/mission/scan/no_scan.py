@@ -29,6 +29,7 @@ class NoScan:
     looking = False
     looks = 0
     sweeps = False
+    unproven = ()
     evidence: frozenset[str] = frozenset()
 
     def wants(self, _node: str) -> bool:
@@ -112,13 +113,16 @@ class NoScan:
     def home(self, certain: bool) -> None:
         """Nothing is proven."""
 
+    def end(self, now_ns: int) -> None:
+        """Nothing was to be counted."""
+
     def doubt(self) -> None:
         """Nothing is kept back."""
 
     def withdraw(self, now_ns: int, reason: str) -> None:
         """Nothing is taken back."""
 
-    def trust(self) -> None:
+    def trust(self, *, moved: bool = False) -> None:
         """Nothing was doubted."""
 
     def take_due(self) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,6 +18,14 @@ from flightd.mission.scan.views import View, ViewPlanner
 _SAME_EXPOSURE = 0.01
 _GIVES_UP = 2
 """So many views of a node that are not reached: what keeps the drone from those keeps it from the others."""
+
+
+class NoAnswer(enum.StrEnum):
+    """Why nothing is known of a location that was to be looked at."""
+
+    NO_PICTURE = "no picture came"
+    NOT_SHOWN = "no picture showed them"
+    NOT_REACHED = "not reached in time"
 
 
 class ScanTask:
@@ -51,8 +60,11 @@ class ScanTask:
         self._begun_ns: int | None = None
         self._relit = False
         self._followed = self._unfollowed = 0
-        self._missed = 0
+        self._misses = 0
+        self._looked = False
+        """A picture of the view that is looked from came, or of an earlier look at the same places."""
         self._findings: list[Finding] = []
+        self._unanswered: dict[str, NoAnswer] = {}
 
     @property
     def view(self) -> View | None:
@@ -90,6 +102,7 @@ class ScanTask:
             self._unfollowed += 1
             return
         self._followed += 1
+        self._looked = True
         places = {place.location: place for place in look.codes.places}
         reads: dict[str, list[PlacedRead]] = {}
         for placed in look.reads:
@@ -120,27 +133,28 @@ class ScanTask:
         if again is not None:
             self._views[0] = again
             return True
-        self._end(left)
+        self._end(left, NoAnswer.NOT_SHOWN if self._looked else NoAnswer.NO_PICTURE)
         return True
 
     def miss(self) -> tuple[str, ...]:
         """The view cannot be reached, and after the second one none is flown to any more.  The locations that
         were to be looked at; they are decided as far as they were seen."""
-        self._missed += 1
-        given_up = self._views[: None if self._missed >= _GIVES_UP else 1]
+        self._misses += 1
+        given_up = self._views[: None if self._misses >= _GIVES_UP else 1]
         missed: tuple[str, ...] = ()
         for view in given_up:
             left = self._left(view)
             missed += left
-            self._end(left)
+            self._end(left, NoAnswer.NOT_REACHED)
         return missed
 
-    def _end(self, left: Sequence[str]) -> None:
-        """Go on to the next view; nothing else is to be learnt of these locations."""
-        self._relit = False
+    def _end(self, left: Sequence[str], why: NoAnswer) -> None:
+        """Go on to the next view; nothing else is to be learnt of these locations, and `why` not if so."""
+        self._relit = self._looked = False
         for code in left:
             self._settle(code, final=True)
-            self._open.pop(code, None)
+            if self._open.pop(code, None) is not None:
+                self._unanswered[code] = why
         self._views.pop(0)
         self._usual.pop(0)
 
@@ -171,6 +185,11 @@ class ScanTask:
         """The locations decided since the last call."""
         found, self._findings = tuple(self._findings), []
         return found
+
+    def drain_unanswered(self) -> dict[str, NoAnswer]:
+        """The locations since the last call that nothing more is to be learnt of, without a finding."""
+        unanswered, self._unanswered = self._unanswered, {}
+        return unanswered
 
     def _left(self, view: View) -> tuple[str, ...]:
         return tuple(code for code in view.locations if code in self._open)

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 from flightd.mission.plan.leg_times import Pace
 from flightd.mission.scan.sweep_planner import SweepPlanner
 
 
 class PassingTime:
-    """By the legs of `sweeps`; `node_of` has the node from which each location is counted."""
+    """By the legs of `sweeps`; `node_of` has the node from which each location is counted, `aisle_of` where
+    each node is."""
 
-    def __init__(self, sweeps: SweepPlanner, node_of: Mapping[str, str]) -> None:
-        self._sweeps, self._node_of = sweeps, node_of
+    def __init__(self, sweeps: SweepPlanner, node_of: Mapping[str, str], aisle_of: Mapping[str, str]) -> None:
+        self._sweeps, self._node_of, self._aisle_of = sweeps, node_of, aisle_of
         self._of: tuple[tuple[str, ...], frozenset[str], Pace] | None = None
         self._share_s: dict[str, float] = {}
 
-    def share_s(self, node: str, nodes: Sequence[str], left: frozenset[str], pace: Pace) -> float:
-        """Of a node, where the locations `left` at the `nodes` of its aisle are counted; 0 where it is not
+    def share_s(self, node: str, left_at: Callable[[str], frozenset[str]], pace: Pace) -> float:
+        """Of a node, where the locations `left_at` each node of its aisle are counted; 0 where it is not
         flown past for one of them."""
-        of = tuple(nodes), left, pace
+        nodes = tuple(other for other, of in self._aisle_of.items() if of == self._aisle_of[node])
+        left = frozenset(code for other in nodes for code in left_at(other))
+        of = nodes, left, pace
         if of != self._of:  # asked of one node of an aisle after the other
             passes = list(self._sweeps.stop_by_stop(nodes, left, 0.0, pace.height_m))
             counted = {self._node_of[code] for legs in passes for leg in legs for code in leg.locations}

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from flightd.core.scanning import Settled
+from flightd.core.types import Event, EventLevel
 
 
 @dataclass(slots=True)
@@ -83,6 +84,18 @@ class PendingFindings:
         self._nodes.clear()
         return codes
 
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Those whose findings are not proven yet, and those that are due again, in the order of their first
+        visit as far as it is known."""
+        pending = (at.node for at in self._nodes if at.locations)
+        return tuple(dict.fromkeys((*pending, *self._due, *self._recalled)))
+
+    def again(self, node: str) -> None:
+        """This node is due again, as one whose findings were withdrawn."""
+        if node not in self._due:
+            self._due.append(node)
+
     def take_due(self) -> tuple[str, ...]:
         """The nodes to fly to once more, in the order of their first visit."""
         due = [node for node in self._due if self._again[node] < self._revisits]
@@ -92,8 +105,19 @@ class PendingFindings:
         self._recalled.clear()
         return tuple(due)
 
+    def tell(self, now_ns: int) -> list[Event]:
+        """What is not proven at the end: it stays pending in the inventory."""
+        findings = sum(len(at.locations) for at in self._nodes)
+        if not findings:
+            return []
+        nodes = ", ".join(at.node for at in self._nodes if at.locations)
+        text = f"{findings} findings are not proven and stay pending, at {nodes}"
+        return [Event(now_ns, EventLevel.WARNING, "unproven", text)]
+
     def begin(self) -> None:
-        """Another flight: no node of the one before is due, and each may be again."""
+        """Another flight: its way proves nothing that was found before, no node is due, and each may be
+        again."""
+        self._nodes.clear()
         self._due.clear()
         self._recalled.clear()
         self._again.clear()

@@ -33,6 +33,7 @@ from flightd.mission.scan.sweep_speed import SweepOptics
 from flightd.mission.scan.sweep_task import SweepTask
 from flightd.mission.scan.sweep_votes import Undecided
 from flightd.mission.scan.told_sweeps import told_runs
+from flightd.mission.scan.unanswered import Unanswered
 from flightd.mission.scan.views import View, ViewPlanner, views_s
 from flightd.site.site import Site
 
@@ -59,26 +60,26 @@ class Scanner:
         self._planner = ViewPlanner(site, sight, self._assigner, params, highest_m, aside_per_height)
         self._node_of = {location.code: location.node for location in site.locations.values()}
         self._sweeps: SweepPlanner | None = None
+        self._aisle_of = {node.id: node.aisle for node in site.nodes.values()}
         self._passing_time: PassingTime | None = None
         if optics is not None:
             self._sweeps = SweepPlanner(site, self._planner, self._assigner, optics)
-            self._passing_time = PassingTime(self._sweeps, self._node_of)
+            self._passing_time = PassingTime(self._sweeps, self._node_of, self._aisle_of)
         self._sweep: SweepTask | None = None
         self._exposure = LegExposure(site, params)
         self._swept: set[str] = set()
         self._passed: dict[str, tuple[SeenRead, ...]] = {}
         self._owners = CodeOwners()
-        self._aisle_of = {node.id: node.aisle for node in site.nodes.values()}
         self._planned = self._wanted = frozenset(site.locations)
         self._done: set[str] = set()
         self._task: ScanTask | None = None
         self._pending = PendingFindings(params.confirm_stops, params.expert.revisits)
+        self._unanswered = Unanswered(self._pending)
         self._labels = LabelChecks()
         self._found: list[Finding] = []
         self._events: list[Event] = []
         self._sightings: list[Sighting] = []
         self._begun = self._begun_blind = 0
-        self._relights = True
         self._by_stopping = False
         self.doubted = False
         self.looks = 0
@@ -169,13 +170,19 @@ class Scanner:
         self._passed.clear()
         self._owners.begin()
         self._pending.begin()
+        self._unanswered.begin()
         self._begun = self._begun_blind = 0
 
     def arrive(self, node: str, height_m: float, yaw_rad: float) -> None:
         """Begin or continue the scan of a node that is reached."""
         self.leave()
-        views = [self._lit(view) for view in self._planner.views(node, self._left(node), height_m, yaw_rad)]
-        self._task = ScanTask(node, views, self._planner, self._params, self._relights, self._passed)
+        views = [
+            # with the exposure that was right when its rack front was flown past
+            replace(view, exposure=self._exposure.of_places(view.locations))
+            for view in self._planner.views(node, self._left(node), height_m, yaw_rad)
+        ]
+        relights = not self._exposure.fixed
+        self._task = ScanTask(node, views, self._planner, self._params, relights, self._passed)
         self._begun, self._begun_blind = self._begun + 1, self._begun_blind + 1
         self._pending.arrive(node)
 
@@ -192,26 +199,19 @@ class Scanner:
             if missed:
                 text = f"no look at {len(missed)} places from {self._task.node}: not reached in time"
                 self._events.append(Event(now_ns, EventLevel.WARNING, "view_missed", text))
+                self._events += self._unanswered.note(self._task, now_ns)
 
     def step(self, now_ns: int) -> bool:
         """True when the view is over; `view` is then the next one."""
-        over = self._task is None or self._task.step(now_ns)
-        if self._task is not None and not self._task.relights:
-            self._fix_exposure(now_ns)
+        if self._task is None:
+            return True
+        over = self._task.step(now_ns)
+        if not self._task.relights:
+            self._events += self._exposure.fix(now_ns)
         self._gather()
+        if over:
+            self._events += self._unanswered.note(self._task, now_ns)
         return over
-
-    def _fix_exposure(self, now_ns: int) -> None:
-        """The front camera has shown that it is exposed as it is."""
-        if self._relights:
-            self._relights = False
-            self._exposure.fix()
-            text = "the front camera does not support exposure control: what is lit wrongly stays unreadable"
-            self._events.append(Event(now_ns, EventLevel.WARNING, "exposure_fixed", text))
-
-    def _lit(self, view: View) -> View:
-        """With the exposure that was right when its rack front was flown past."""
-        return replace(view, exposure=self._exposure.of_places(view.locations))
 
     def leave(self) -> None:
         """The node is left; what was not decided there stays to count."""
@@ -227,6 +227,10 @@ class Scanner:
         """The flight has come back to its pad over known lines: everything is where it should be."""
         if certain and not self.doubted:
             self._pending.confirm_all(self._present)
+
+    def end(self, now_ns: int) -> None:
+        """The flight is over: tell what has no answer, and what is not proven."""
+        self._events += (*self._unanswered.tell(self._done, now_ns), *self._pending.tell(now_ns))
 
     def doubt(self) -> None:
         """The place may be another one: assign nothing, and keep what is pending, until `trust`."""
@@ -251,15 +255,21 @@ class Scanner:
             self._gather_sweep()
         self._passed.clear()
 
-    def trust(self) -> None:
-        """The place is known again; labels that still contradict it hang wrong."""
+    def trust(self, *, moved: bool = False) -> None:
+        """The place is known again, `moved`: as another one; else labels that contradict it hang wrong."""
         self.doubted = False
-        self._labels.trust()
+        self._labels.trust(moved=moved)
 
     def take_due(self) -> tuple[str, ...]:
-        """The nodes with something to count to fly to once more, their findings having been withdrawn, in the
-        order of their first visit; each at most `revisits` times in a flight."""
+        """The nodes with something to count to fly to once more, their findings having been withdrawn or no
+        picture having come there, in the order of their first visit; each at most `revisits` times in a
+        flight."""
         return tuple(node for node in self._pending.take_due() if self._left(node))
+
+    @property
+    def unproven(self) -> tuple[str, ...]:
+        """The nodes that another flight has to count where this one ends now, though it visited them."""
+        return self._pending.nodes
 
     # Counting in passing
 
@@ -320,7 +330,7 @@ class Scanner:
                 self._exposure.aim(leg, self._sweeps.sharp_mps, flown_mps)
                 self._sweep.fly(now_ns, leg)
             if not self._exposure.follows:
-                self._fix_exposure(now_ns)
+                self._events += self._exposure.fix(now_ns)
             self._sweep.step(now_ns)
             self._gather_sweep()
 
@@ -330,10 +340,7 @@ class Scanner:
             return
         self._sweep.end()
         self._gather_sweep()
-        why = self._sweep.why
-        left = ", ".join(f"{count} {reason}" for reason, count in sorted(why.items()))
-        text = f"{why.total()} places to stop before" + (f": {left}" if left else "")
-        self._events.append(Event(now_ns, EventLevel.INFO, "swept", text))
+        self._events.append(Event(now_ns, EventLevel.INFO, "swept", self._sweep.outcome))
         self._events += self._exposure.drain_events(now_ns)
         self._sweep = None
 
@@ -347,9 +354,7 @@ class Scanner:
     @property
     def looking(self) -> bool:
         """Whether the front camera's pictures are wanted now."""
-        if self._passing is not None:
-            return True
-        return self._task is not None and bool(self._task.looking)
+        return self._passing is not None or (self._task is not None and bool(self._task.looking))
 
     def places(self, pose: BodyPose) -> tuple[Place, ...]:
         """The places wanted in a picture taken at `pose`; none for one that would not count."""
@@ -401,9 +406,7 @@ class Scanner:
         nothing of the picture may count."""
         self._sightings += look.sightings
         stamp_ns = look.pose.stamp_ns
-        for text in self._labels.new_unmapped(look.unmapped):
-            words = f"label {text}, seen from {where}, is not on the map: not counted as stock"
-            self._events.append(Event(stamp_ns, EventLevel.WARNING, "unknown_location", words))
+        self._events += self._labels.unknown(look, where)
         against = self._labels.against(look.sightings)
         if against is not None:
             text = f"label {against.location} seen {against.off_m:+.2f} m from its place"
@@ -483,13 +486,12 @@ class Scanner:
 
     def _passed_s(self, node: str, pace: Pace, choice: CountChoice | None) -> float:
         """A node's share of the time in which its aisle is counted in passing; 0 where it is not."""
-        if self._passing_time is None:
-            return 0.0
-        aisle = self._aisle_of[node]
-        nodes = [other for other, of in self._aisle_of.items() if of == aisle]
-        left = {code for other in nodes for code in self._left(other)} - self._swept
-        chosen = frozenset(left) if choice is None else self._chosen(left, choice)
-        return self._passing_time.share_s(node, nodes, chosen, pace)
+
+        def left_at(other: str) -> frozenset[str]:
+            left = self._left(other) - self._swept
+            return left if choice is None else self._chosen(left, choice)
+
+        return 0.0 if self._passing_time is None else self._passing_time.share_s(node, left_at, pace)
 
     def _chosen(self, codes: Iterable[str], choice: CountChoice) -> frozenset[str]:
         places = map(self._site.locations.__getitem__, codes)

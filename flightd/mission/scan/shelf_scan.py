@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from flightd.core.types import Event, Phase
+from flightd.core.types import OVER, Event, Phase
 from flightd.mission.guidance import MissionInputs
 from flightd.mission.plan.flight_plan import Stop
 from flightd.mission.plan.sweep_leg import SweepLeg
@@ -22,6 +22,8 @@ _ENDS = (Phase.LAND, Phase.DONE, Phase.ABORTED, Phase.PILOT)
 _SAME_SHARE = 0.5
 """A position that is corrected by less than this part of the way to the nearest other place is the same."""
 _OVER = (Trigger.DWELLED, Trigger.ROUTE_DONE)
+_ON_PAD = (Trigger.DOWN_TO_SWAP, Trigger.DOWN_AS_TOLD)
+"""Landings after which another flight begins at a position of its own."""
 _PASSING = (Phase.FOLLOW, Phase.HOVER, Phase.TURN)
 """In which the pictures of a flight past a shelf count."""
 
@@ -32,7 +34,7 @@ class ShelfScan:
     def __init__(self, site: Site, scanner: AnyScanner) -> None:
         self._scanner = scanner
         self._scanned = ""
-        self._sweeping = False
+        self._sweeping = self._lands_home = False
         self.legs: tuple[SweepLeg, ...] = ()
         """What is to be flown past from the stop that is hovered at."""
         self._apart_m = _least_apart_m(site)
@@ -95,7 +97,10 @@ class ShelfScan:
         return legs
 
     def step(self, s: MissionInputs, stop: Stop) -> None:
-        """Decide what has been flown past by now on the way to `stop`."""
+        """Decide what has been flown past by now on the way to `stop`, and whether its pad proves the way."""
+        if self._lands_home and s.pose is not None:
+            self._lands_home = s.pose.node == stop.node  # else it was not there before, either
+            self._scanner.home(self._lands_home and self._is_certain(s))
         if self._sweeping:
             self._scanner.step_sweep(s.now_ns, stop.sweep, s.speed_mps)
 
@@ -117,13 +122,14 @@ class ShelfScan:
         """A phase has changed at (or on the way to) `stop`; `shift_m` is how far off the position was that
         was doubted."""
         scanner = self._scanner
-        certain = s.pose is not None and s.localised and s.pose.integrity >= scanner.least_integrity
+        certain = self._is_certain(s)
         if trigger is Trigger.POSITION_DOUBTED:
             scanner.doubt()
         elif trigger is Trigger.POSITION_SURE:
-            if shift_m >= _SAME_SHARE * self._apart_m:
+            moved = shift_m >= _SAME_SHARE * self._apart_m
+            if moved:
                 scanner.withdraw(s.now_ns, f"the position was {shift_m:.2f} m off")
-            scanner.trust()
+            scanner.trust(moved=moved)
         elif phase in _ENDS and scanner.doubted:
             scanner.withdraw(s.now_ns, "the position was not found again")
         elif trigger is Trigger.ARRIVED:
@@ -140,8 +146,23 @@ class ShelfScan:
             self._scanned = stop.node if trigger in _OVER else ""
         if self._sweeping:
             self._lead_sweep(s, phase, trigger, stop)
-        if trigger is Trigger.ROUTE_DONE:
-            scanner.home(certain)
+        self._come_home(s, phase, trigger)
+
+    def _come_home(self, s: MissionInputs, phase: Phase, trigger: Trigger) -> None:
+        """Over its pad all is proven, or becomes so on the way down; what is not by then is told, and where
+        another flight follows from there it counts no more."""
+        self._lands_home = trigger is Trigger.ROUTE_DONE
+        if self._lands_home:
+            self._scanner.home(self._is_certain(s))
+        if trigger in _ON_PAD:
+            self._scanner.withdraw(s.now_ns, "its place was not certain down to the pad")
+        if phase in OVER or trigger is Trigger.DOWN_AS_TOLD:
+            self._scanner.end(s.now_ns)
+
+    def _is_certain(self, s: MissionInputs) -> bool:
+        """Whether what the position says is good enough to prove findings."""
+        sure = s.pose is not None and s.pose.integrity >= self._scanner.least_integrity
+        return sure and s.localised
 
     def _lead_sweep(self, s: MissionInputs, phase: Phase, trigger: Trigger, stop: Stop) -> None:
         """Pictures count from the beginning of a leg until the next one's, but for interruptions."""

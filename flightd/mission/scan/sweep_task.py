@@ -168,9 +168,11 @@ class SweepTask:
         return tuple(votes.evidence for votes in self._votes.values())
 
     @property
-    def why(self) -> Counter[Undecided]:
-        """How many places are not decided, by the reason."""
-        return Counter(self.undecided.values())
+    def outcome(self) -> str:
+        """How many places are not decided, and why."""
+        why = Counter(self.undecided.values())
+        left = ", ".join(f"{count} {reason}" for reason, count in sorted(why.items()))
+        return f"{why.total()} places to stop before" + (f": {left}" if left else "")
 
     def _votes_of(self, code: str, leg: SweepLeg) -> SweepVotes:
         if code not in self._votes:

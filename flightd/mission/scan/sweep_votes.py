@@ -133,7 +133,8 @@ class SweepVotes:
 
     def _with_codes(self, found: Finding) -> Finding | Undecided:
         """Codes count that several views give; several of them, where a view shows each two together."""
-        if any(read.agreeing < 2 for read in found.reads):
+        beside = self._texts & {code.text for code in found.undecided}
+        if beside or any(read.agreeing < 2 for read in found.reads):
             return Undecided.ONCE
         texts = sorted({read.text for read in found.reads})
         if any(pair not in self._together for pair in combinations(texts, 2)):
@@ -151,7 +152,7 @@ class SweepVotes:
     def _unread(self, found: Finding) -> Finding | Undecided:
         """Nothing is unreadable by few views, by bad light, or from one angle."""
         sweep = self._params.sweep
-        if self._texts:
+        if self._votes.torn:
             return Undecided.TORN
         if self._votes.any_read:
             return Undecided.PART if self._votes.only_parts else Undecided.ONCE

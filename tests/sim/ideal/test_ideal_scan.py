@@ -82,6 +82,27 @@ def test_a_flight_counts_every_location_of_its_nodes_and_proves_them_at_home() -
     assert Counter(output.phase for output in flown.outputs)[Phase.SCAN] > 0
 
 
+def test_what_was_not_proven_when_it_landed_is_left_over_for_the_next_flight() -> None:
+    flight = scan_flight(site=ONE_SIDED, stock=PLAIN)
+    assert flight.pilot.left_over == NODES
+    at_last: list[tuple[str, ...]] = []
+
+    def order(phase: Phase, now_ns: int) -> None:
+        mission = flight.pilot.mission
+        if phase is Phase.SCAN and mission.goal.node == NODES[-1] and not at_last:
+            at_last.append(mission.remaining)
+            mission.command(Command("1", CommandKind.LAND), now_ns)
+
+    flight.on_tick = order
+    flown = flight.fly()
+    assert (flown.phase, at_last) == (Phase.ABORTED, [NODES[-1:]])
+    assert set(findings(flown)) >= places_of(ONE_SIDED, "A2")
+    assert flight.pilot.left_over == NODES
+    rest = scan_flight(flight.pilot.left_over, site=ONE_SIDED, stock=PLAIN)
+    assert rest.fly().phase is Phase.DONE
+    assert rest.pilot.left_over == (), "all is proven"
+
+
 def test_a_pause_amid_a_scan_loses_and_doubles_nothing() -> None:
     flight = scan_flight(("A2",), site=ONE_SIDED)
     paused: list[int] = []

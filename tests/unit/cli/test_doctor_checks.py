@@ -39,7 +39,14 @@ from flightd.doctor.latency import (
     judge_latency,
     measure_stages,
 )
-from flightd.doctor.machine import Load, check_disk, judge_clock, judge_disk, judge_processor
+from flightd.doctor.machine import (
+    Load,
+    check_disk,
+    judge_clock,
+    judge_count_clock,
+    judge_disk,
+    judge_processor,
+)
 from flightd.doctor.vehicle import judge as judge_vehicle
 from flightd.doctor.written_files import check_written
 from flightd.site.site_file import load_site
@@ -110,6 +117,15 @@ deny("clock_adjtime")
 found = check_clock()
 print(found.level, found.text)
 """
+
+
+@pytest.mark.parametrize(("newest_ns", "found"), [(0, []), (10**18, []), (10**18 + 1, [CheckLevel.ERROR])])
+def test_a_clock_behind_the_newest_look_of_the_inventory(newest_ns: int, found: list[CheckLevel]) -> None:
+    checks = judge_count_clock(10**18, newest_ns)
+    assert levels(checks) == found
+    for check in checks:
+        assert "2001-09-09T01:46:40" in check.text
+        assert "set the clock" in check.remedy
 
 
 @pytest.mark.parametrize(

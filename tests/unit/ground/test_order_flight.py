@@ -16,6 +16,7 @@ from flightd.adapters.ground_link.messages.counts import NodeCount
 from flightd.adapters.ground_link.messages.floor import FloorWay
 from flightd.adapters.ground_link.messages.published import EventReport, Position
 from flightd.core.errors import InputError
+from flightd.core.told_codes import told_codes
 from flightd.core.types import CommandKind, EventLevel, Phase
 from flightd.fleet.vda5050.codec import Version
 from flightd.fleet.vda5050.state import OperatingMode
@@ -388,6 +389,13 @@ def test_a_count_is_told_in_words() -> None:
     assert counted_in_words(rows, "A2", expects) == "1 of 2 places with codes; not read: X"
     assert counted_in_words(rows, "B1", expects) is None
     assert counted_in_words(rows, "A2", ScanShelf((1,), Side.LEFT)) == "1 of 2 places with codes", "not told"
+
+
+def test_a_code_that_holds_a_space_is_one_code() -> None:
+    rows = [{"node": "A2", **told_codes(["LOT 12", "LOT 13"])}]
+    expects = ScanShelf(expected=("LOT 12", "LOT 13", "LOT", "LOT 12 LOT 13"))
+    told = "1 of 1 places with codes; not read: LOT, LOT 12 LOT 13"
+    assert counted_in_words(rows, "A2", expects) == told
 
 
 def test_a_count_tells_only_of_the_side_and_levels_that_were_asked_for() -> None:

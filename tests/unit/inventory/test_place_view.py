@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flightd.core.inventory import LocationRecord, LocationState, Observation, Standing
+from flightd.core.told_codes import told_codes
 from flightd.core.types import CodeRead
 from flightd.inventory.place_view import PlaceView, ShownState, place_views, view_of_told
 
@@ -53,6 +54,14 @@ def test_what_was_only_withdrawn_is_contradicted_and_counts_for_nothing() -> Non
         (
             {"location": "A-1", "state": "several", "texts": "X Y", "standing": "confirmed"},
             PlaceView("A-1", ShownState.SEVERAL, ("X", "Y")),
+        ),
+        (
+            {"location": "A-1", "state": "several", **told_codes(["LOT 12", "LOT 13", "LOT 12"])},
+            PlaceView("A-1", ShownState.SEVERAL, ("LOT 12", "LOT 13")),
+        ),
+        (
+            {"location": "A-1", "state": "read", "texts": "LOT 12", "codes": '["LOT 12'},
+            PlaceView("A-1", ShownState.READ, ("LOT 12",)),
         ),
         ({"location": "A-1", "state": "of another version"}, PlaceView("A-1", ShownState.NOT_VISITED)),
         ({}, PlaceView("", ShownState.NOT_VISITED)),

@@ -207,6 +207,26 @@ def test_a_contradicting_location_label_withdraws_what_is_pending() -> None:
     assert scanner.wants("A2"), "the withdrawn is left to count"
 
 
+@pytest.mark.parametrize("moved", [True, False])
+def test_a_label_that_told_a_wrong_place_is_heeded_again_and_one_that_hangs_wrong_is_not(moved: bool) -> None:
+    scanner = Scanner(SITE, SIGHT, PARAMS, aside_per_height=ASIDE_PER_HEIGHT)
+    wrong = next(p.code for p in SITE.locations.values() if p.node == "A1")
+
+    def doubted_at(now_ns: int) -> bool:
+        scanner.arrive("A3", 1.0, -math.pi / 2)
+        scanner.begin(now_ns)
+        here = pose(now_ns + STEP_NS, x_m=2.6)
+        scanner.take(picture(1, (read(wrong),), {}, here.stamp_ns), here)
+        return scanner.doubted
+
+    assert doubted_at(10**9)
+    if moved:
+        scanner.withdraw(2 * 10**9, "the position was 1.30 m off")
+    scanner.trust(moved=moved)
+    assert not scanner.doubted
+    assert doubted_at(3 * 10**9) is moved
+
+
 def test_a_code_that_may_be_its_own_is_no_empty_place() -> None:
     hover = Hover(PARAMS.with_values(retakes=0))
     code = LOCATIONS[0]

@@ -150,6 +150,30 @@ def test_what_one_view_alone_gives_is_visited_again() -> None:
     assert verdict([(), [placed("P1", sure=False)], (), ()]) is Undecided.ONCE
 
 
+def test_several_looks_at_one_picture_are_one_view() -> None:
+    """Scaled and turned, one picture says what it says again."""
+    often = replace(placed("P1", sure=False), read=replace(read("P1", sure=False), agreeing=3))
+    assert verdict([(), [often], (), ()]) is Undecided.ONCE
+    assert stopped([(), [often], (), ()]) == ("unreadable", [], [("P1", 1)])
+    sure = replace(often, read=replace(often.read, sure=True))
+    assert verdict([(), [sure], (), ()]) is Undecided.ONCE
+    for found in (verdict([(), [often], [often], ()]), verdict([(), [sure], [sure], ()])):
+        assert isinstance(found, Finding)
+        assert [(read.text, read.agreeing) for read in found.reads] == [("P1", 2)]
+    assert stopped([(), [often], [often], ()]) == ("read", ["P1"], [])
+
+
+def test_a_stop_looks_on_while_one_picture_alone_gives_a_code() -> None:
+    often = replace(placed("P1"), read=replace(read("P1"), agreeing=3))
+    votes = LocationVotes(CODE, "A2", PARAMS.pictures)
+    for seq, reads in enumerate([[often], [], [], [], []]):
+        votes.add(seq, pose(seq), PlaceLook(CODE, QUAD, 1.0, GOODS, code=bool(reads)), reads)
+        assert votes.finding(final=False) is None
+    found = votes.finding(final=True)
+    assert found is not None
+    assert (found.state, found.reads[0].agreeing) == (LocationState.READ, 1), "a checksum vouches for it"
+
+
 def test_two_codes_are_two_labels_only_where_a_view_shows_both() -> None:
     one, two = placed("P1", 0.9), placed("P2", 1.2)
     assert state(verdict([[one, two], [one], [two], [one, two]])) is LocationState.SEVERAL
@@ -172,7 +196,7 @@ def test_half_a_code_at_the_pictures_edge_does_not_make_another_of_its_label() -
     assert verdict([whole, whole, half]) is Undecided.TORN, "too few to overrule it"
     assert verdict([whole, whole, whole, half, half]) is Undecided.TORN, "more than a slip"
     beside = [replace(half[0], x_m=1.2)]
-    assert state(verdict([whole, whole, whole, beside])) is Undecided.APART
+    assert verdict([whole, whole, whole, beside]) is Undecided.ONCE
     assert verdict([whole, whole, whole, [placed("P2")]]) is Undecided.TORN, "vouched for, too"
 
 

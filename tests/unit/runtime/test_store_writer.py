@@ -12,6 +12,7 @@ import msgspec
 import pytest
 
 from flightd.adapters.store.sqlite import SqliteStore
+from flightd.app.counting import store_writer
 from flightd.app.counting.store_writer import StoreWriter
 from flightd.core.errors import UnavailableError
 from flightd.core.inventory import LocationRecord, LocationState, Observation, PlannedLocation, UndecidedCode
@@ -162,3 +163,30 @@ def test_the_writer_never_holds_up_the_loop(tmp_path: Path) -> None:
 
     with SqliteStore(tmp_path) as store:
         real(main(StubbornStore(store)))
+
+
+@pytest.mark.parametrize(("set_s", "dated_s"), [(3600, 3600), (-3600, 0)])
+def test_findings_are_dated_by_the_clock_at_take_off_and_never_before_earlier_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, set_s: int, dated_s: int
+) -> None:
+    """A computer without a battery for its clock is told the date by the network, or not yet."""
+
+    async def write(store: SqliteStore) -> None:
+        clock = LoopClock()
+        with StoreWriter(store, "run", 10**18, clock, pytest.fail, held) as writer:
+            writer.put(finding(1), b"")
+            zero_ns = 10**18 + set_s * 10**9
+            monkeypatch.setattr(store_writer, "utc_at_zero_ns", lambda _clock: zero_ns)
+            running = asyncio.ensure_future(writer.run(pytest.fail))
+            await asyncio.sleep(1.0)
+            writer.take_off()
+            writer.put(finding(2), b"")
+            await asyncio.sleep(1.0)
+            running.cancel()
+            await asyncio.wait([running])
+
+    with SqliteStore(tmp_path) as store:
+        virtual(write(store))
+        first, second = (store.looks(f"A-{n}")[0][0].utc_ns for n in (1, 2))
+    stamps_ns = finding(2).stamp_ns - finding(1).stamp_ns
+    assert second - first == stamps_ns + dated_s * 10**9

@@ -132,5 +132,24 @@ def test_what_is_left_over_takes_the_place_of_the_configured_nodes(tmp_path: Pat
     assert plan_of(config, DEMO, order).stops[0].visit
 
 
+@pytest.mark.parametrize(
+    "left", ["", "[]", '{"site": "large", "remaining": ["A2"], "stand": "A1", "yaw_rad": 0}']
+)
+def test_a_start_in_the_air_is_never_refused_for_what_is_left_over(tmp_path: Path, left: str) -> None:
+    """It looks after what flies, whatever the file says."""
+    path = tmp_path / "progress.json"
+    config = load_config(CONFIGS / "sim.toml").with_values(mission={"progress": path})
+    if left:
+        path.write_text(left)
+    else:
+        real(kept(path, ("A2",), ()))  # on the way home
+    with pytest.raises(InputError):
+        taken_up(config, path, wanted=True)
+    order = configured_order(config)
+    assert resumed(order, config, path, DEMO, wanted=True, in_air=True) == order
+    none = config.with_values(mission={"progress": None})
+    assert resumed(order, none, path, DEMO, wanted=True, in_air=True) == order
+
+
 def taken_up(config: Config, path: Path, *, wanted: bool) -> FlightOrder:
     return resumed(configured_order(config), config, path, DEMO, wanted=wanted)

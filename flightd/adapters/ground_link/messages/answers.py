@@ -178,4 +178,10 @@ class PictureAnswer(DaemonAnswer, frozen=True, tag="picture"):
 class InventoryAnswer(DaemonAnswer, frozen=True, tag="inventory"):
     """What has been counted so far."""
 
-    places: Annotated[tuple[dict[str, str], ...], Meta(description="one object per place")]
+    places: Annotated[
+        tuple[dict[str, str], ...],
+        Meta(
+            description="one object per place; `codes` is the list of its codes in JSON, `texts` has them"
+            " joined by spaces"
+        ),
+    ]

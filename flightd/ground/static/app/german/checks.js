@@ -115,6 +115,8 @@ export default {
   "use a kernel with high-resolution timers": "nehmen Sie einen Kernel mit feinen Zeitgebern",
   "the date says {year}": "das Datum sagt {year}",
   "set the clock: a signed link and logs need it": "stellen Sie die Uhr: Signierte Verbindung und Protokolle brauchen sie",
+  "the inventory has a look of {newest}, and this computer's clock says {now}": "der Bestand hat eine Aufnahme von {newest}, und die Uhr dieses Rechners sagt {now}",
+  "set the clock, or begin another inventory.folder: what is counted now would be taken for older": "stellen Sie die Uhr, oder beginnen Sie einen anderen inventory.folder: Was jetzt gezählt wird, gälte als älter",
   "nothing keeps the date right": "nichts hält das Datum richtig",
   "run systemd-timesyncd or chrony: logs and signed links need it": "starten Sie systemd-timesyncd oder chrony: Protokolle und signierte Verbindungen brauchen das",
   "monotonic in fine steps, date synchronised": "monoton in feinen Schritten, Datum abgeglichen",

@@ -83,6 +83,8 @@ export default {
   "swept": "vorbeigeflogen",
   "face light": "Licht am Regal",
   "view missed": "Blick verfehlt",
+  "unanswered": "ohne Antwort",
+  "unproven": "nicht belegt",
   "camera {url}: {what} ({n} refused so far)": "Kamera {url}: {what} (bisher {n} verworfen)",
   "a frame came out of order": "ein Bild kam in falscher Reihenfolge",
   "a frame was exposed {age} s ago": "ein Bild wurde vor {age} s belichtet",
