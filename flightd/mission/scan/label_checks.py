@@ -29,16 +29,8 @@ class LabelChecks:
         """The labels in a picture taken at `where` that are not on the map, each told once."""
         new = [text for text in dict.fromkeys(look.unmapped) if text not in self._unmapped]
         self._unmapped.update(new)
-        told = "is not on the map: not counted as stock"
-        return [
-            Event(
-                look.pose.stamp_ns,
-                EventLevel.WARNING,
-                "unknown_location",
-                f"label {text}, seen from {where}, {told}",
-            )
-            for text in new
-        ]
+        words = [f"label {text}, seen from {where}, is not on the map: not counted as stock" for text in new]
+        return [Event(look.pose.stamp_ns, EventLevel.WARNING, "unknown_location", text) for text in words]
 
     def against(self, sightings: Iterable[Sighting]) -> Sighting | None:
         """The first of these labels to contradict the place; all that do are kept."""

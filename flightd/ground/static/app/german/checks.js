@@ -24,6 +24,7 @@ export default {
   "clock": "Uhr",
   "disk": "Festplatte",
   "files": "Dateien",
+  "inventory clock": "Uhr der Zählung",
   "cpu": "Prozessor",
   "memory": "Speicher",
   "delay": "Verzögerung",

@@ -301,6 +301,7 @@ export default {
   "{n} places at {node} have no answer: {why}": "{n} Plätze an {node} ohne Antwort: {why}",
   "no picture came": "es kam kein Bild",
   "no picture showed them": "kein Bild zeigte sie",
+  "not reached in time": "nicht rechtzeitig erreicht",
   "{n} places that were to be counted have no answer, at {nodes}": "{n} Plätze, die zu zählen waren, sind ohne Antwort, an {nodes}",
   "{n} findings are not proven and stay pending, at {nodes}": "{n} Befunde sind nicht belegt und bleiben vorläufig, an {nodes}",
   "its place was not certain down to the pad": "sein Ort war bis auf den Landeplatz hinab nicht sicher",
