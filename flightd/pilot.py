@@ -87,8 +87,10 @@ class Pilot:
     @property
     def left_over(self) -> tuple[str, ...]:
         """The stops for a flight that goes on with this one, in order: first what was visited and would not
-        count if this one ended now."""
+        count if this one ended now.  A mission that is done leaves nothing over: the next one is whole."""
         remaining = self._mission.remaining
+        if self._mission.phase is Phase.DONE:
+            return remaining
         return (*(node for node in self._scanner.unproven if node not in remaining), *remaining)
 
     @property

@@ -98,7 +98,9 @@ def together(name: str, told: Mapping[str, Any], more: Mapping[str, Any]) -> dic
     if again := set(told["seeds"]) & set(more["seeds"]):
         raise MixedError(f"{name}: told of already: seeds {_seeds_text(sorted(again))}")
     if told.get("scenario") != more.get("scenario"):
-        raise MixedError(f"{name}: its scenario is another one since; --renew tells of these alone")
+        raise MixedError(
+            f"{name}: its scenario is another one since, or not kept; --renew tells of these alone"
+        )
     both: dict[str, Any] = {key: told[key] for key in (*_ORIGIN, "scenario") if key in told}
     both |= {"seeds": sorted([*told["seeds"], *more["seeds"]]), "flown": max(told["flown"], more["flown"])}
     for key in [key for key in {**told, **more} if key not in both]:

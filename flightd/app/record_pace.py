@@ -26,6 +26,7 @@ class RecordPace:
         self._waits_since_ns: int | None = None
         self._idle = False
         self._kept_ns: dict[Topic, int] = {}
+        self._sees = False
 
     def take(self, snapshot: Snapshot) -> None:
         """The newest tick, before it is recorded itself."""
@@ -35,13 +36,16 @@ class RecordPace:
             self._waits_since_ns = None
         elif self._waits_since_ns is None or snapshot.tick.commands:
             self._waits_since_ns = now_ns
+        self._sees = bool(snapshot.tick.lines)
         since_ns = self._waits_since_ns
         self._idle = since_ns is not None and now_ns - since_ns >= _WHOLE_NS
 
     def due(self, topic: Topic, stamp_ns: int) -> bool:
         """Whether a message of that topic is kept; it counts as kept then."""
-        kept_ns = self._kept_ns.get(topic)
-        if self._idle and kept_ns is not None and 0 <= stamp_ns - kept_ns < _PERIODS_NS[topic]:
+        kept_ns, period_ns = self._kept_ns.get(topic), _PERIODS_NS[topic]
+        if topic is Topic.TICK and not self._sees:  # one that sees first: a replay starts by how fresh it is
+            period_ns *= 2
+        if self._idle and kept_ns is not None and 0 <= stamp_ns - kept_ns < period_ns:
             return False
         self._kept_ns[topic] = stamp_ns
         return True

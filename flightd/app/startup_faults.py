@@ -27,6 +27,10 @@ class StartupFaults:
             yield
         except (InputError, UnavailableError) as err:
             self.do_without(err)
+        except OSError as err:  # such as a disk that fails, or a process that has no room
+            if not self._in_air:
+                raise
+            self.do_without(UnavailableError(str(err)))
 
     def do_without(self, err: FlightdError) -> None:
         """Go on without a part that cannot be had.  Raises `err` where nothing can be in the air."""

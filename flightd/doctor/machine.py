@@ -18,6 +18,7 @@ from flightd.doctor.check import Check, error, ok, unseen, warning
 
 _TICK_RESOLUTION_S = 0.001
 _OLDEST_YEAR = 2025
+_DAY_NS = 86_400_000_000_000
 _UNSYNCHRONISED = 5
 """TIME_ERROR, what adjtimex(2) returns while nothing disciplines the clock."""
 _TIMEX_BYTES = 512
@@ -66,8 +67,9 @@ def judge_clock(resolution_s: float, year: int, *, synchronised: bool | None) ->
 
 
 def check_count_clock(newest_ns: int) -> list[Check]:
-    """Whether the date lies before the newest look of the inventory (UTC; 0: none): of the looks at a place
-    the one with the newest date counts, which would hide what is counted now."""
+    """Whether the date lies before the newest look of the inventory (UTC; 0: none).  Of the looks at a place
+    the one with the newest date counts, so that those of this flight are dated after it; beyond a day it is
+    no clock that lost an hour."""
     return judge_count_clock(time.time_ns(), newest_ns)
 
 
@@ -76,7 +78,11 @@ def judge_count_clock(now_ns: int, newest_ns: int) -> list[Check]:
         return []
     now, newest = utc_text(now_ns), utc_text(newest_ns)
     text = f"the inventory has a look of {newest}, and this computer's clock says {now}"
-    remedy = "set the clock, or begin another inventory.folder: what is counted now would be taken for older"
+    if newest_ns - now_ns < _DAY_NS:  # a computer that was without power, and has no clock of its own
+        return [
+            warning("inventory clock", text, "set the clock: what is counted now is dated after that look")
+        ]
+    remedy = "set the clock, or begin another inventory.folder: no count can be dated by it"
     return [error("inventory clock", text, remedy)]
 
 

@@ -34,8 +34,11 @@ def check_written(config: Config) -> list[Check]:
 
 def _may_be_written(path: Path) -> bool:
     """The file or folder itself where it is there, and the folder in which it is made or replaced."""
-    folder = next(above for above in path.absolute().parents if above.exists())
-    return folder.is_dir() and _open_to_us(folder) and (not path.exists() or _open_to_us(path))
+    try:
+        folder = next(above for above in path.absolute().parents if above.exists())
+        return folder.is_dir() and _open_to_us(folder) and (not path.exists() or _open_to_us(path))
+    except PermissionError:  # a folder above may not even be searched
+        return False
 
 
 def _open_to_us(path: Path) -> bool:

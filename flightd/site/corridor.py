@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flightd.site.site import Node, Shelf, Site
+from flightd.site.rack_depth import rack_body
+from flightd.site.site import Node, Site
 from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut
 
 _BACK_MPS = 0.3
@@ -16,7 +17,7 @@ _BACK_MPS = 0.3
 NEAR_KEEP_OUT_M = KEEP_OUT_CLEARANCE_M / 2
 """Nearer to a keep-out than this the free way is left: half of what every open line keeps from it."""
 _BESIDE_SHELF_M, _LEAST_M = 0.35, 0.2
-"""The free way ends so far before a shelf, for a drone has a width, but is no narrower than this."""
+"""The free way ends so far before a rack, for a drone has a width, but is no narrower than this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class Nearest:
 
 class Corridor:
     """All points off the keep-outs within `half_width_m` of an edge of the grid that none of them closes;
-    less where a shelf stands nearer, as the racks' ends do beside a cross way."""
+    less where a rack stands nearer, as the racks' ends do beside a cross way."""
 
     def __init__(self, site: Site, half_width_m: float) -> None:
         self._keep_outs = site.keep_outs
@@ -44,30 +45,41 @@ class Corridor:
             if not any(area.touches(a.x_m, a.y_m, b.x_m, b.y_m) for area in site.keep_outs)
         ]
         ends = open_ends or ends
-        self._free_m = np.array([_free_m(site.shelves, a, b, half_width_m) for a, b in ends])
+        racks = [rack_body(site, shelf) for shelf in site.shelves]
+        self._free_m = np.array([_free_m(racks, a, b, half_width_m) for a, b in ends])
         self._a = np.array([(a.x_m, a.y_m) for a, _ in ends]).reshape(-1, 2)
         self._along = np.array([(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in ends]).reshape(-1, 2)
         self._square = np.maximum(np.einsum("ij,ij->i", self._along, self._along), 1e-12)
-        self._last: tuple[tuple[float, float], Nearest] | None = None
+        self._last: tuple[tuple[float, float], tuple[Nearest, Nearest]] | None = None
 
     def nearest(self, x_m: float, y_m: float) -> Nearest:
-        """The point on the grid whose free way is the nearest; distance infinite on a site without edges.
-        Each tick asks for one point several times."""
+        """The nearest point of the grid; distance infinite on a site without edges."""
+        return self._both(x_m, y_m)[0]
+
+    def nearest_way(self, x_m: float, y_m: float) -> Nearest:
+        """The point of the grid from which the way is free the furthest towards this one, or beyond it."""
+        return self._both(x_m, y_m)[1]
+
+    def _both(self, x_m: float, y_m: float) -> tuple[Nearest, Nearest]:
+        """Each tick asks for one point several times."""
         if self._last is None or self._last[0] != (x_m, y_m):
-            self._last = (x_m, y_m), self._nearest(x_m, y_m)
+            self._last = (x_m, y_m), self._looked_up(x_m, y_m)
         return self._last[1]
 
-    def _nearest(self, x_m: float, y_m: float) -> Nearest:
+    def _looked_up(self, x_m: float, y_m: float) -> tuple[Nearest, Nearest]:
         if not len(self._a):
-            return Nearest(x_m, y_m, math.inf)
+            return (nowhere := Nearest(x_m, y_m, math.inf)), nowhere
         away = np.array((x_m, y_m)) - self._a
         share = np.einsum("ij,ij->i", away, self._along) / self._square
         np.maximum(np.minimum(share, 1.0, out=share), 0.0, out=share)  # np.clip takes five times as long
         points = self._a + share[:, None] * self._along
         distances = np.hypot(points[:, 0] - x_m, points[:, 1] - y_m)
-        best = int((distances - self._free_m).argmin())
-        at_x, at_y = points[best].tolist()
-        return Nearest(at_x, at_y, float(distances[best]), float(self._free_m[best]))
+        at, free_m = points.tolist(), self._free_m
+        line, way = (
+            Nearest(at[best][0], at[best][1], float(distances[best]), float(free_m[best]))
+            for best in (int(distances.argmin()), int((distances - free_m).argmin()))
+        )
+        return line, way
 
     def nearest_keep_out(self, x_m: float, y_m: float) -> Nearest:
         """The nearest point of a keep-out's edge; the distance is negative within it, and infinite on a site
@@ -77,8 +89,8 @@ class Corridor:
 
     def outside_m(self, x_m: float, y_m: float) -> float:
         """How far outside the free way a point is; 0 within it."""
-        near = self.nearest(x_m, y_m)
-        beside_m = near.distance_m - near.free_m
+        way = self.nearest_way(x_m, y_m)
+        beside_m = way.distance_m - way.free_m
         return max(beside_m, NEAR_KEEP_OUT_M - self.nearest_keep_out(x_m, y_m).distance_m, 0.0)
 
     def back(
@@ -87,7 +99,7 @@ class Corridor:
         """Near a keep-out, or beside one that stands below the legs as high as `height_m` (NaN: unknown): the
         unit vector (map axes) away from it; outside: the one back to the line.  None elsewhere, and when the
         drone comes back already."""
-        area, near = self.nearest_keep_out(x_m, y_m), self.nearest(x_m, y_m)
+        area, near = self.nearest_keep_out(x_m, y_m), self.nearest_way(x_m, y_m)
         for low in self._low_keep_outs:
             beside = _nearest_of(low, x_m, y_m)
             is_level = not height_m > low.to_m + KEEP_OUT_CLEARANCE_M
@@ -102,14 +114,14 @@ class Corridor:
         return None if vx_mps * bx + vy_mps * by > _BACK_MPS else (bx, by)
 
 
-def _free_m(shelves: Sequence[Shelf], a: Node, b: Node, most_m: float) -> float:
+def _free_m(racks: Sequence[KeepOut], a: Node, b: Node, most_m: float) -> float:
     """How far the way along an edge is free to both sides."""
     gaps = (
         math.hypot(
-            max(min(a.x_m, b.x_m) - shelf.x1_m, shelf.x0_m - max(a.x_m, b.x_m), 0.0),
-            max(min(a.y_m, b.y_m) - shelf.y_m, shelf.y_m - max(a.y_m, b.y_m), 0.0),
+            max(min(a.x_m, b.x_m) - rack.x1_m, rack.x0_m - max(a.x_m, b.x_m), 0.0),
+            max(min(a.y_m, b.y_m) - rack.y1_m, rack.y0_m - max(a.y_m, b.y_m), 0.0),
         )
-        for shelf in shelves
+        for rack in racks
     )
     return min(most_m, max(min(gaps, default=math.inf) - _BESIDE_SHELF_M, _LEAST_M))
 

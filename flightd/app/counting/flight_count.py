@@ -95,7 +95,7 @@ class FlightCount:
                 StoreWriter(
                     self._store,
                     self._run,
-                    utc_at_zero_ns(clock),
+                    max(utc_at_zero_ns(clock), self.newest_ns - clock.now_ns()),  # never before what is there
                     clock,
                     _LOG.warning,
                     hold,

@@ -19,7 +19,6 @@ from flightd.replay.log import FlightLog, read_log
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, score
 from flightd.sim.judge.hazard_verdict import HazardVerdict, judged_hazard
-from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.judge.verdict import JudgedFault, judged
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
 
@@ -70,7 +69,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         armed=armed or None,
         piloted_ns=_piloted_ns(simulation, begun),
         lost=_lost(flown),
-        truth_lost=_lost(world) + TrueMotion.of(truth).gaps,
+        truth_lost=_lost(world),
     )
     figures = score(evidence)
     stock = stock_summary(simulation, meant, figures.flight_time_s)

@@ -25,6 +25,8 @@ _BACK_M = 0.5
 _PAST_M = 1.0
 """So far from where a doubt began the next one is another: at what lies there for good it does not doubt for
 ever."""
+_RISING = frozenset({Phase.PREFLIGHT, Phase.ARMING, Phase.TAKE_OFF})
+"""A drone whose height is not known may stand then."""
 
 
 class Relocator:
@@ -61,7 +63,7 @@ class Relocator:
     def step(self, s: MissionInputs, phase: Phase, phase_s: float) -> set[Trigger]:
         """The triggers of a position doubted, sure again, or not found in time."""
         p = self._params
-        self._watch_jumps(s)
+        self._watch_jumps(s, phase)
         self._watch_way(s, phase)
         sure = s.pose is not None and s.pose.integrity >= p.integrity_min
         doubt_s = self._doubt.step(s.pose is not None and not sure, s.now_ns)
@@ -122,7 +124,7 @@ class Relocator:
         elif phase is not Phase.RELOCATE:
             self._trail.step(s.pose.x_m, s.pose.y_m)
 
-    def _watch_jumps(self, s: MissionInputs) -> None:
+    def _watch_jumps(self, s: MissionInputs, phase: Phase) -> None:
         self.jump_m = (0.0, 0.0)
         if s.pose is None:  # a new flight begins on its pad, wherever the last one was believed to end
             self._last = None
@@ -138,5 +140,6 @@ class Relocator:
                 if self._doubted is not None:
                     self._doubted = self._doubted[0] + dx, self._doubted[1] + dy
                 self._shift = (self._shift[0] + dx, self._shift[1] + dy)
-                self._moved |= not s.height_m <= self._params.expert.steer_above_m  # or at a height unknown
+                unknown = math.isnan(s.height_m) and phase not in _RISING
+                self._moved |= unknown or s.height_m > self._params.expert.steer_above_m
         self._last = at

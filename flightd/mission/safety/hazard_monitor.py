@@ -111,7 +111,8 @@ class HazardMonitor:
         holding = found & _HOLDING_BUT_LINES
         held_s = self._trouble.step(bool(holding), s.now_ns)
         worse_s = self._worse.step(bool(holding - {Trigger.SWINGS}), s.now_ns)
-        if held_s > _SWINGS_LAND_S or worse_s > self._params.lines_land_s:
+        lasts_s = self._params.lines_land_s
+        if held_s > max(_SWINGS_LAND_S, lasts_s) or worse_s > lasts_s:
             found.add(Trigger.HAZARD_LASTS)
         return found - {Trigger.LINES_FOUND} if holding else found
 

@@ -28,8 +28,9 @@ swings of a stuck reading hide shows in both."""
 _AGREED_SHARE, _AGREED_S = 0.1, 0.5
 """A height that was doubted is believed again once the lines agree with it so well for so long: where they
 are few, the width of another line lies in between."""
-_KNOWN_M = 0.3
-"""A position less certain than this (standard deviation) cannot tell whether the corridor is left."""
+_KNOWN_M, _KNOWN_SHARE = 0.3, 2.0 / 3.0
+"""A position less certain than this (standard deviation), or than this share of the way that is free beside
+the line, cannot tell whether the corridor is left."""
 
 
 class PlausibilityMonitor:
@@ -140,7 +141,8 @@ class PlausibilityMonitor:
     def _tells_side(self, pose: GridPose, line_m: tuple[float, float]) -> bool:
         """The position is known well enough to say how far the nearest line, and keep-out, is."""
         area = self._corridor.nearest_keep_out(pose.x_m, pose.y_m)
-        by_line = _across_sigma_m(pose, line_m) < _KNOWN_M
+        free_m = self._corridor.nearest_way(pose.x_m, pose.y_m).free_m
+        by_line = _across_sigma_m(pose, line_m) < min(_KNOWN_M, _KNOWN_SHARE * free_m)
         return by_line and (
             math.isinf(area.distance_m) or _across_sigma_m(pose, (area.x_m, area.y_m)) < _KNOWN_M
         )

@@ -199,7 +199,7 @@ class Scanner:
             if missed:
                 text = f"no look at {len(missed)} places from {self._task.node}: not reached in time"
                 self._events.append(Event(now_ns, EventLevel.WARNING, "view_missed", text))
-                self._events += self._unanswered.note(self._task, now_ns)
+                self._events += self._unanswered.note(self._task, now_ns, blind=self.blind is not None)
 
     def step(self, now_ns: int) -> bool:
         """True when the view is over; `view` is then the next one."""
@@ -210,7 +210,7 @@ class Scanner:
             self._events += self._exposure.fix(now_ns)
         self._gather()
         if over:
-            self._events += self._unanswered.note(self._task, now_ns)
+            self._events += self._unanswered.note(self._task, now_ns, blind=self.blind is not None)
         return over
 
     def leave(self) -> None:

@@ -154,7 +154,7 @@ class ShelfScan:
         self._lands_home = trigger is Trigger.ROUTE_DONE
         if self._lands_home:
             self._scanner.home(self._is_certain(s))
-        if trigger in _ON_PAD:
+        if trigger in _ON_PAD and self._scanner.unproven:
             self._scanner.withdraw(s.now_ns, "its place was not certain down to the pad")
         if phase in OVER or trigger is Trigger.DOWN_AS_TOLD:
             self._scanner.end(s.now_ns)

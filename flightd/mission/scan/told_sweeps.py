@@ -88,7 +88,7 @@ def _why(lane: Lane, stops_for: StopCause) -> str:
             lost = lane.legibility is not Legibility.SURE
             return f"{LEGIBILITY_WORDS[lane.legibility]}; {small}" if lost else small
         case StopCause.WIDTH:
-            return "its places are nearly as wide as the picture, or wider"
+            return "passed at a crawl: its places are as wide as the picture, or it is read too seldom"
         case StopCause.LINE:
             return "the line is not open and clear both ways"
         case StopCause.NODES:

@@ -21,15 +21,15 @@ class Unanswered:
         """Another flight looks at all of them anew."""
         self._node_of.clear()
 
-    def note(self, task: ScanTask, now_ns: int) -> list[Event]:
+    def note(self, task: ScanTask, now_ns: int, *, blind: bool) -> list[Event]:
         """What has no answer at a node when its last view is over; it is due again where that is for want of
-        pictures."""
+        pictures, unless nothing is seen at any node any more (`blind`)."""
         if task.view is not None:
             return []
         open_now = task.drain_unanswered()
         self._node_of |= dict.fromkeys(open_now, task.node)
         whys = Counter(open_now.values())
-        if whys[NoAnswer.NO_PICTURE]:
+        if whys[NoAnswer.NO_PICTURE] and not blind:
             self._pending.again(task.node)
         return [
             Event(

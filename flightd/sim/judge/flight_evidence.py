@@ -21,7 +21,7 @@ class FlightEvidence:
     the daemon's, `truth` and `armed` the simulator's; all in time order.  `armed` is None where the vehicle
     does not tell.  `piloted_ns`: from when on there was a pilot who could take over, infinite where there was
     none; a hand-over before is the autopilot's failsafe, and still judged.  `lost`: messages that the flight
-    log did not take; `truth_lost`: those that the truth lacks, and its gaps."""
+    log did not take; `truth_lost`: those that the truth lacks."""
 
     site: Site
     plan: FlightPlan

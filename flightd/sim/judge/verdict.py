@@ -106,7 +106,7 @@ def judged(
     end_s = float(flight.truth[-1].stamp_ns * 1e-9) - flight.begun_s if flight.truth else 0.0
     counts = {
         "record_lost": flight.lost,
-        "truth_lost": flight.truth_lost,
+        "truth_lost": flight.truth_lost + flight.motion.gaps,
         "miscounted": score.nodes_miscounted,
         "codes_wrong": codes_wrong,
         "empty_wrong": empty_wrong,

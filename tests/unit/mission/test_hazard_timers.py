@@ -8,6 +8,7 @@ from flightd.core.types import Phase
 from flightd.mission.guidance import ALL_WELL
 from flightd.mission.machine import Intent, State
 from flightd.mission.safety.hazard_monitor import Counted
+from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import Flight
 from tests.unit.mission.states import fresh
 
@@ -43,3 +44,10 @@ def test_what_is_counted_anew_is_news_from_the_first() -> None:
     counted = Counted()
     told = [counted.step(count, second * 1_000_000_000) for second, count in enumerate((0, 1, 1, 1, 0, 0, 1))]
     assert told == [False, True, True, False, False, False, True]
+
+
+def test_what_holds_is_held_for_as_long_as_is_configured_though_swings_are_not() -> None:
+    flight = fresh(State(Phase.FOLLOW, Intent.VISIT), configured(lines_land_s=30.0))
+    flight.set(warnings=replace(ALL_WELL, frozen_s=9.0))
+    flight.run(14.0, follow=False)
+    assert flight.phase is Phase.HOLD

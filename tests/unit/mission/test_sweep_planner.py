@@ -238,7 +238,7 @@ def test_the_plan_says_once_what_is_alike_and_what_limits_it() -> None:
             NODES,
             {},
             "width",
-            "its places are nearly as wide as the picture, or wider",
+            "its places are as wide as the picture, or it is read too seldom",
         ),
         (SITE, ("A2",), {}, "nodes", "before one node only"),
         (parse_site(ONE_WAY, "one way"), ("A1", "A2", "A3"), {}, "line", "not open and clear both ways"),

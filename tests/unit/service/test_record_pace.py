@@ -52,12 +52,14 @@ class Unheard:
 def ticked(
     from_ns: int, to_ns: int, phase: Phase = Phase.PREFLIGHT, *, armed: bool = False
 ) -> Iterable[Snapshot]:
-    """Ticks of a drone that stands, its vehicle heard."""
+    """Ticks of a drone that stands, its vehicle heard, a picture with every other one."""
     for since_ns in range(from_ns, to_ns, TICK_NS):
         now_ns = START_NS + since_ns
         tick = vitals(now_ns, phase=phase, heard_ns=now_ns)
         assert tick.vehicle is not None
-        yield replace(tick, tick=replace(tick.tick, vehicle=replace(tick.vehicle, armed=armed)))
+        seen = (LineSet(0, now_ns, 64, 36, (), (), "combined"),) if since_ns // TICK_NS % 2 else ()
+        told = replace(tick.tick, vehicle=replace(tick.vehicle, armed=armed), lines=seen)
+        yield replace(tick, tick=told)
 
 
 def logged(*stretches: Iterable[Snapshot]) -> Log:
@@ -76,6 +78,8 @@ def test_of_a_long_wait_a_tick_a_second_is_kept_after_a_minute_of_all() -> None:
     assert 170 <= waits[Topic.TICK] <= 181
     assert waits[Topic.TICK] == waits[Topic.DECISION] == waits[Topic.VEHICLE]
     assert 160 <= waits[Topic.STATUS] <= 181
+    kept = [since_ns for topic, since_ns in log.kept if topic == Topic.TICK and since_ns >= MINUTE]
+    assert all(since_ns // TICK_NS % 2 for since_ns in kept[1:]), "a replay starts by the newest picture"
 
 
 def test_from_arming_on_all_is_kept_with_the_change_of_phase() -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from flightd.site.corridor import NEAR_KEEP_OUT_M, Corridor
 from flightd.site.site_file import load_site
 from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut
+from tests.unit.site.test_rack_depth import two_aisles
 
 SITE = load_site(Path(__file__).parents[3] / "configs" / "site-demo.toml")
 A, B = SITE.aisle_nodes(SITE.aisles[0].id)[1:3]
@@ -67,3 +68,18 @@ def test_between_the_ends_of_racks_the_way_across_is_narrower_than_an_aisle() ->
     assert corridor.back(a1.x_m + end_m - 0.3, between, 0.0, 0.0) == pytest.approx((-1.0, 0.0))
     assert corridor.outside_m(a1.x_m + end_m - 0.3, a1.y_m) == 0.0, "along the aisle it is on the line"
     assert corridor.outside_m(a1.x_m + 1.0, a1.y_m + 0.5) == pytest.approx(0.05)
+
+
+def test_behind_a_rack_with_one_front_the_way_is_narrower_too() -> None:
+    """Its body ends 0.6 m before the line of the next aisle, whose own fronts are further off."""
+    site = two_aisles(2.4, only_a=True)
+    corridor, behind = Corridor(site, 0.45), site.nodes["B2"]
+    assert corridor.outside_m(behind.x_m + 0.4, behind.y_m - 0.44) == pytest.approx(0.19)
+    assert corridor.outside_m(behind.x_m + 0.4, behind.y_m - 0.2) == 0.0
+
+
+def test_the_nearest_line_is_the_nearest_whatever_is_free_beside_it() -> None:
+    racks = load_site(Path(__file__).parents[3] / "configs" / "site-racks.toml")
+    a1 = racks.nodes["A1"]
+    near = Corridor(racks, 0.45).nearest(a1.x_m, a1.y_m + 0.19)
+    assert (near.x_m, near.y_m, near.distance_m) == pytest.approx((a1.x_m, a1.y_m + 0.19, 0.0))

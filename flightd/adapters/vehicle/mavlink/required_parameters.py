@@ -194,8 +194,8 @@ _PX4: tuple[Rule, ...] = (
     Rule(("MPC_THR_HOVER",), within(0.1, 0.8), "0.1 to 0.8", "the first guess of the hover thrust"),
 )
 
-_LAST_RESORT_V = 0.1
-"""So far below `cell_land_v` a cell has enough left to come down by."""
+_LAST_RESORT_V, _AFTER_HOME_V = 0.1, 0.05
+"""So far below `cell_land_v` a cell has enough to come down by, so far below `cell_home_v` to get home by."""
 _GUID_OPTIONS = "the thrust of our setpoints would be taken for something else (vehicle.raw_thrust)"
 
 _ARDUPILOT_GUIDED = (
@@ -226,13 +226,27 @@ def _guid_options(raw: bool) -> Rule:
 def _low_volt(battery: BatteryConfig, cells: int) -> Rule:
     """The autopilot's landing is the last resort: after our way home, not before it."""
     least = round((battery.cell_land_v - _LAST_RESORT_V) * cells, 2)
-    most, better = round(battery.cell_home_v * cells, 2), round(battery.cell_land_v * cells, 2)
+    most_v = max(battery.cell_home_v - _AFTER_HOME_V, battery.cell_land_v)
+    most, better = round(most_v * cells, 2), round(battery.cell_land_v * cells, 2)
     return Rule(
         ("BATT_LOW_VOLT",),
         within(least, most),
         f"{least:g} to {most:g} V for {cells} cells (battery.cells, cell_home_v, cell_land_v)",
         "above, the autopilot lands in the aisle what could still fly home; below, it acts too late",
         better,
+    )
+
+
+def _critical_volt(battery: BatteryConfig, cells: int) -> Rule:
+    """An ArduPilot with a critical voltage above its low one is refused arming."""
+    most = round((battery.cell_land_v - _LAST_RESORT_V) * cells, 2)
+    return Rule(
+        ("BATT_CRT_VOLT",),
+        lambda value: value <= most,
+        f"0, or up to {most:g} V for {cells} cells (battery.cells, cell_land_v)",
+        "it has to lie below BATT_LOW_VOLT, else nothing arms",
+        0,
+        optional=True,
     )
 
 
@@ -278,7 +292,7 @@ def rules_for(firmware: Firmware, job: Job) -> tuple[Rule, ...]:
     if firmware is Firmware.ARDUPILOT:
         extra += (_supervised(job.own_system_id), _alone(job.own_system_id))
         if cells is not None:
-            extra += (_low_volt(job.battery, cells),)
+            extra += (_low_volt(job.battery, cells), _critical_volt(job.battery, cells))
         if job.guided:
             extra += _ARDUPILOT_GUIDED
         if job.raw_thrust is not None:

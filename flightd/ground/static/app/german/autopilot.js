@@ -75,6 +75,8 @@ export default {
   "{bits}, without height and heading (bits 1 and 3)": "{bits}, ohne Höhe und Kurs (Bits 1 und 3)",
   "0 (thrust is a climb rate)": "0 (Schub ist eine Steigrate)",
   "8 (raw thrust)": "8 (roher Schub)",
+  "0, or up to {most} V for {cells} cells (battery.cells, cell_land_v)": "0, oder bis {most} V für {cells} Zellen (battery.cells, cell_land_v)",
+  "it has to lie below BATT_LOW_VOLT, else nothing arms": "sie muss unter BATT_LOW_VOLT liegen, sonst geht nichts scharf",
   "{least} to {most} V for {cells} cells (battery.cells, cell_home_v, cell_land_v)": "{least} bis {most} V für {cells} Zellen (battery.cells, cell_home_v, cell_land_v)",
   // parameters: why
   "the height above the floor comes from it": "die Höhe über dem Boden kommt von ihm",

@@ -330,7 +330,7 @@ export default {
   "by stopping": "im Stehen",
   "labels cannot be read": "Etiketten sind nicht zu lesen",
   "labels are not surely read": "Etiketten werden nicht sicher gelesen",
-  "its places are nearly as wide as the picture, or wider": "die Plätze sind fast so breit wie das Bild oder breiter",
+  "passed at a crawl: its places are as wide as the picture, or it is read too seldom": "der Vorbeiflug wäre ein Kriechen: Die Plätze sind so breit wie das Bild, oder Bilder werden zu selten gelesen",
   "the line is not open and clear both ways": "die Linie ist nicht in beiden Richtungen offen und frei",
   "it is before one node only": "nur vor einem Knoten",
   "aisle {aisle}, level {level}": "Gang {aisle}, Ebene {level}",
