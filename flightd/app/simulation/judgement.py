@@ -78,6 +78,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         figures,
         codes_wrong=stock["codes_wrong"],
         empty_wrong=stock.get("empty_wrong", 0),
+        truth_gaps=evidence.motion.gaps,
         not_looked_at=stock.get("locations_planned", 0) - stock.get("locations_visited", 0),
     )
     sensors = sensor_summary(simulation, last_known([status.sensors for status in statuses]))

@@ -89,7 +89,7 @@ def test_without_ray_there_is_one_line_with_what_to_do(
 ) -> None:
     (tmp_path / "flight.mcap").touch()
     monkeypatch.setitem(sys.modules, "ray", None)
-    said = "Ray is not installed; pip install 'flightd[ray]', or take --engine local"
+    said = "Ray is not installed; pip install -e '.[ray]' in the checkout, or take --engine local"
     ended = flightd("study", tmp_path, "--engine", "ray")
     assert ended == (2, "", f"flightd: --engine ray: {said}\n")
 
