@@ -74,10 +74,10 @@ class Corridor:
         np.maximum(np.minimum(share, 1.0, out=share), 0.0, out=share)  # np.clip takes five times as long
         points = self._a + share[:, None] * self._along
         distances = np.hypot(points[:, 0] - x_m, points[:, 1] - y_m)
-        at, free_m = points.tolist(), self._free_m
+        free_m = self._free_m
         line, way = (
-            Nearest(at[best][0], at[best][1], float(distances[best]), float(free_m[best]))
-            for best in (int(distances.argmin()), int((distances - free_m).argmin()))
+            Nearest(*(float(value) for value in (*points[best], distances[best], free_m[best])))
+            for best in (distances.argmin(), (distances - free_m).argmin())
         )
         return line, way
 

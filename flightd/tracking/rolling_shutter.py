@@ -76,7 +76,7 @@ def _put_back(points_px: Matrix, lens: Lens, motion: ImageMotion, readout_s: flo
     centre, focal = np.array(lens.centre_px), np.array([lens.fx_px, lens.fy_px])
     rays = (points_px + centre - (lens.cx_px, lens.cy_px)) / focal
     (x, y), (right, down, optical) = rays.T, motion.turn_radps.tolist()
-    # the rays are (x, y, 1), and np.cross takes ten times as long for as few
+    # the rays are (x, y, 1), and np.cross takes nearly three times as long for as few
     turned = np.column_stack([down - optical * y, optical * x - right, right * y - down * x])
     speeds = -motion.travel_per_s - turned
     flow_px: Matrix = (speeds[:, :2] - rays * speeds[:, 2:]) * focal

@@ -69,7 +69,6 @@ def judge_flight(simulation: Simulation) -> Judgement:
         armed=armed or None,
         piloted_ns=_piloted_ns(simulation, begun),
         lost=_lost(flown),
-        truth_lost=_lost(world),
     )
     figures = score(evidence)
     stock = stock_summary(simulation, meant, figures.flight_time_s)
@@ -78,7 +77,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         figures,
         codes_wrong=stock["codes_wrong"],
         empty_wrong=stock.get("empty_wrong", 0),
-        truth_gaps=evidence.motion.gaps,
+        truth_lost=_lost(world) + evidence.motion.gaps,
         not_looked_at=stock.get("locations_planned", 0) - stock.get("locations_visited", 0),
     )
     sensors = sensor_summary(simulation, last_known([status.sensors for status in statuses]))

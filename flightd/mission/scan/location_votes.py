@@ -18,7 +18,7 @@ _LEAST_SHARE = 0.6
 _WHOLE_SHARE = 0.9
 """Part that one picture at least must show before no further ones are needed: what is cut off may hold a
 second label."""
-_LEAST_FRAMES = 2
+LEAST_FRAMES = 2
 """Frames that must agree on what a code says."""
 _SAME_LABEL = 0.5
 """Two codes nearer to each other than this part of their size are one label."""
@@ -161,7 +161,7 @@ class LocationVotes:
 
     @staticmethod
     def _agreed(believed: Sequence[PlacedRead]) -> bool:
-        return all(placed.read.agreeing >= _LEAST_FRAMES for placed in believed)
+        return all(placed.read.agreeing >= LEAST_FRAMES for placed in believed)
 
     def _with_codes(
         self, believed: Sequence[PlacedRead], undecided: tuple[UndecidedCode, ...], pose: BodyPose
@@ -169,7 +169,7 @@ class LocationVotes:
         several = len({placed.read.text for placed in believed}) > 1
         confidence = min(
             placed.probability
-            * (_SURE_TEXT if placed.read.sure and placed.read.agreeing >= _LEAST_FRAMES else _AGREED_TEXT)
+            * (_SURE_TEXT if placed.read.sure and placed.read.agreeing >= LEAST_FRAMES else _AGREED_TEXT)
             for placed in believed
         )
         state = LocationState.SEVERAL if several else LocationState.READ
@@ -234,7 +234,7 @@ class LocationVotes:
 
 def _counts(placed: PlacedRead) -> bool:
     """Whether a believed read is a finding: one frame alone is no proof of what no checksum vouches for."""
-    return placed.read.sure or placed.read.agreeing >= _LEAST_FRAMES
+    return placed.read.sure or placed.read.agreeing >= LEAST_FRAMES
 
 
 def _lies_on(doubtful: PlacedRead, label: PlacedRead) -> bool:

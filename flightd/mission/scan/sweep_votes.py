@@ -17,7 +17,7 @@ from flightd.core.inventory import LocationState
 from flightd.core.scanning import BodyPose, Finding, Light, Occupancy, PictureWorth, PlaceLook
 from flightd.mission.scan.code_assignment import PlacedRead
 from flightd.mission.scan.code_votes import SeenRead
-from flightd.mission.scan.location_votes import SEEN_EMPTY, LocationVotes
+from flightd.mission.scan.location_votes import LEAST_FRAMES, SEEN_EMPTY, LocationVotes
 
 _SEEN_SHARE = 0.6
 """Part of what can be seen of a place that a picture must show to say anything of it."""
@@ -134,7 +134,7 @@ class SweepVotes:
     def _with_codes(self, found: Finding) -> Finding | Undecided:
         """Codes count that several views give; several of them, where a view shows each two together."""
         beside = self._texts & {code.text for code in found.undecided}
-        if beside or any(read.agreeing < 2 for read in found.reads):
+        if beside or any(read.agreeing < LEAST_FRAMES for read in found.reads):
             return Undecided.ONCE
         texts = sorted({read.text for read in found.reads})
         if any(pair not in self._together for pair in combinations(texts, 2)):

@@ -21,7 +21,7 @@ class FlightEvidence:
     the daemon's, `truth` and `armed` the simulator's; all in time order.  `armed` is None where the vehicle
     does not tell.  `piloted_ns`: from when on there was a pilot who could take over, infinite where there was
     none; a hand-over before is the autopilot's failsafe, and still judged.  `lost`: messages that the flight
-    log did not take; `truth_lost`: those that the truth lacks."""
+    log did not take."""
 
     site: Site
     plan: FlightPlan
@@ -32,7 +32,6 @@ class FlightEvidence:
     armed: Sequence[ArmedChange] | None = None
     piloted_ns: float = -math.inf
     lost: int = 0
-    truth_lost: int = 0
 
     @cached_property
     def handed_over_ns(self) -> float:

@@ -100,15 +100,15 @@ def judged(
     codes_wrong: int = 0,
     empty_wrong: int = 0,
     not_looked_at: int = 0,
-    truth_gaps: int = 0,
+    truth_lost: int = 0,
 ) -> list[JudgedFault]:
     """All faults of a flight, in the order of `KINDS`.  `not_looked_at`: places that were to be counted,
-    and of which it is not even known that they are unreadable or covered; `truth_gaps`: how often nothing is
-    known of the motion for too long."""
+    and of which it is not even known that they are unreadable or covered; `truth_lost`: what its log lacks,
+    and how often nothing is known of the motion for too long."""
     end_s = float(flight.truth[-1].stamp_ns * 1e-9) - flight.begun_s if flight.truth else 0.0
     counts = {
         "record_lost": flight.lost,
-        "truth_lost": flight.truth_lost + truth_gaps,
+        "truth_lost": truth_lost,
         "miscounted": score.nodes_miscounted,
         "codes_wrong": codes_wrong,
         "empty_wrong": empty_wrong,

@@ -225,7 +225,7 @@ def _guid_options(raw: bool) -> Rule:
 
 def _low_volt(battery: BatteryConfig, cells: int) -> Rule:
     """The autopilot's landing is the last resort: after our way home, not before it."""
-    least = round((battery.cell_land_v - _LAST_RESORT_V) * cells, 2)
+    least = _last_resort_v(battery, cells)
     most_v = max(battery.cell_home_v - _AFTER_HOME_V, battery.cell_land_v)
     most, better = round(most_v * cells, 2), round(battery.cell_land_v * cells, 2)
     return Rule(
@@ -239,7 +239,7 @@ def _low_volt(battery: BatteryConfig, cells: int) -> Rule:
 
 def _critical_volt(battery: BatteryConfig, cells: int) -> Rule:
     """An ArduPilot with a critical voltage above its low one is refused arming."""
-    most = round((battery.cell_land_v - _LAST_RESORT_V) * cells, 2)
+    most = _last_resort_v(battery, cells)
     return Rule(
         ("BATT_CRT_VOLT",),
         lambda value: value <= most,
@@ -248,6 +248,10 @@ def _critical_volt(battery: BatteryConfig, cells: int) -> Rule:
         0,
         optional=True,
     )
+
+
+def _last_resort_v(battery: BatteryConfig, cells: int) -> float:
+    return round((battery.cell_land_v - _LAST_RESORT_V) * cells, 2)
 
 
 def _cells_of(cells: int) -> Rule:
