@@ -137,7 +137,8 @@ class McapRecorder:
             raise UnavailableError(f"{path}: cannot write the flight log: {err.strerror}") from None
         self._metadata = _metadata({"version": flightd.__version__, **(metadata or {})})
         self._queue += self._metadata
-        self._start("create")
+        with self._starting:
+            self._start("create")
 
     @property
     def written(self) -> int:
@@ -214,7 +215,7 @@ class McapRecorder:
             now_s = time.monotonic()
             if self._child.poll() is not None:
                 self._give_up()
-                await asyncio.to_thread(self._start, "resume")
+                await asyncio.to_thread(self._start_again)
                 await asyncio.sleep(RESTART_S)
             elif self._watch.hangs(now_s):
                 self._watch.kill(now_s)
@@ -229,9 +230,9 @@ class McapRecorder:
             if self._closed:
                 return
             self._closed = True
-        if self._child.poll() is not None:
-            self._give_up()
-            self._start("resume")
+            if self._child.poll() is not None:
+                self._give_up()
+                self._start("resume")
         if self.dropped:
             self._queue += _metadata({"dropped": str(self.dropped)})
         with suppress(OSError):
@@ -320,7 +321,9 @@ class McapRecorder:
         self._link.close()
         code, hung = self._child.wait(), self._watch.was_killed
         self._restarts += 1
+        waited = self._waiting
         self._forget(self._head_bytes)
+        self._accepted -= waited - self._waiting  # nobody recorded what only repeats
         self._accepted_before = self._accepted - self._waiting
         self._tally = WriterTally(found=self._tally.written, written=self._tally.written, lost=0, error="")
         self._answers.clear()
@@ -333,13 +336,20 @@ class McapRecorder:
         event = Event(self._newest_ns, EventLevel.WARNING, "recorder_died", text)
         self.record(Topic.EVENT, self._newest_ns, event)
 
+    def _start_again(self) -> None:
+        """In a thread, beside whatever is recorded meanwhile, unless `close` was first: its `run` may be
+        cancelled, this cannot be, and of two that write one file the second dies."""
+        with self._starting:
+            if not self._closed:
+                self._start("resume")
+
     def _start(self, how: str) -> None:
-        """Begin a writing process; in a thread, beside whatever is recorded meanwhile."""
+        """Begin a writing process; `_starting` is held."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
         ours.setblocking(False)
         package_root = str(Path(flightd.__file__).parents[1])
         search_path = os.pathsep.join(filter(None, (package_root, os.environ.get("PYTHONPATH"))))
-        with self._starting, theirs, undisturbed():
+        with theirs, undisturbed():
             self._child = subprocess.Popen(  # noqa: S603
                 [
                     sys.executable,

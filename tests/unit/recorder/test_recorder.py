@@ -277,6 +277,32 @@ def test_the_log_is_readable_after_kill_9_and_goes_on_in_the_same_file(tmp_path:
     assert recorder.dropped == 0
 
 
+def test_a_writer_that_dies_before_it_took_anything_costs_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "flight.mcap"
+
+    async def fly() -> McapRecorder:
+        recorder = McapRecorder(path)
+        recorder.record(Topic.MAP, 0, Document("map"))
+        running = asyncio.create_task(recorder.run())
+        await _readable(path, 1)
+        first = recorder.pid
+        os.kill(first, signal.SIGKILL)
+        await until(lambda: recorder.pid != first)
+        os.kill(recorder.pid, signal.SIGKILL)
+        await until(lambda: recorder.restarts == 2)
+        running.cancel()
+        await asyncio.wait([running])
+        recorder.close()
+        return recorder
+
+    recorder = real(fly())
+    log = read_log(path)
+    assert log.messages(Document) == [Document("map"), Document("map")]
+    assert [event.name for event in log.messages(Event)] == ["recorder_died", "recorder_died"]
+    assert recorder.written == len(log.entries)
+    assert recorder.dropped == 0
+
+
 def test_what_died_with_the_writer_is_counted_as_dropped(tmp_path: Path) -> None:
     recorder = McapRecorder(tmp_path / "flight.mcap")
     os.kill(recorder.pid, signal.SIGSTOP)
