@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from flightd.app.simulation.scenario_sweep import hazard_scenarios
+from flightd.app.simulation.sweep_routes import ROUTES
 from flightd.guide.pages import FOLDER
 from flightd.sim.scenario.scenario_files import shipped_scenarios
 
@@ -128,8 +129,8 @@ def markdown() -> str:
         cells = [f"`{name}`", _cause(paths[name]), found_by, str(row.action)]
         if shown is None:
             cells += ["not yet", *[""] * 8]
-        elif shown.get("scenario", _digest(paths[name])) != _digest(paths[name]):
-            cells += ["not since its scenario changed", *[""] * 8]
+        elif shown.get("scenario", digest(paths[name])) != digest(paths[name]):
+            cells += ["not since its scenario or routes changed", *[""] * 8]
         else:
             cells += [*_cells(shown), *_origin_cells(shown)]
         lines.append(f"| {' | '.join(cells)} |")
@@ -168,9 +169,9 @@ def _seeds_text(seeds: Sequence[int]) -> str:
     return ", ".join(f"{first} to {last}" if last > first else f"{first}" for first, last in runs)
 
 
-def _digest(scenario: Path) -> str:
-    """Of what goes wrong in it, by which flights of an older one are told from those of this one."""
-    return hashlib.sha256(scenario.read_bytes()).hexdigest()[:12]
+def digest(scenario: Path) -> str:
+    """Of what goes wrong in it and on which routes, by which flights of an older one are told from these."""
+    return hashlib.sha256(scenario.read_bytes() + repr(ROUTES).encode()).hexdigest()[:12]
 
 
 def _cause(scenario: Path) -> str:
@@ -210,7 +211,7 @@ def _document(
     hazards, of_pairs = evidence_of(flights), evidence_of_pairs(pairs)
     paths = shipped_scenarios()
     for name, row in hazards.items():
-        row["scenario"] = _digest(paths[name])
+        row["scenario"] = digest(paths[name])
     if options.add or options.renew:
         told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
         if told["world"] != world:

@@ -17,6 +17,7 @@ from flightd.core.errors import RunError
 if TYPE_CHECKING:
     from flightd.app.simulation.prepare import SimOptions
     from flightd.app.simulation.simulation import Simulation
+    from flightd.app.simulation.sweep_routes import SweepRoute
 
 EXAMPLES = """Examples:
 
@@ -118,8 +119,9 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
     """One flight, one for each seed, or one for each hazard and seed, in folders of their own."""
     from flightd.app.simulation.flown_code import flown_code
     from flightd.app.simulation.prepare import prepare
-    from flightd.app.simulation.scenario_sweep import SHORT_ROUTE, Origin, hazard_scenarios
+    from flightd.app.simulation.scenario_sweep import Origin, hazard_scenarios
     from flightd.app.simulation.sweep_log import SweepLog, asked_of
+    from flightd.app.simulation.sweep_routes import ALONG
     from flightd.cli.scenario_sweep import fly_seeds, sweep
     from flightd.sim.scenario.scenario import Scenario
     from flightd.sim.scenario.scenario_files import load_scenarios
@@ -127,12 +129,12 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
     every = range(options.seed, options.seed + seeds)
     if scenario == ["all"]:
 
-        def prepared(conditions: Scenario, name: str, seed: int) -> Simulation:
+        def prepared(conditions: Scenario, name: str, seed: int, route: SweepRoute) -> Simulation:
             folder = out / name if seeds == 1 else out / name / f"seed-{seed}"
-            return prepare(replace(options, seed=seed), conditions, folder, _say, sweep_route=SHORT_ROUTE)
+            return prepare(replace(options, seed=seed), conditions, folder, _say, sweep_route=route.setting)
 
         # what cannot be flown at all is refused here
-        first = prepare(options, Scenario(), out, lambda _: None, sweep_route=SHORT_ROUTE)
+        first = prepare(options, Scenario(), out, lambda _: None, sweep_route=ALONG.setting)
         origin = Origin(options.world, first.config.vehicle.kind, flown_code())
         asked = asked_of(options, len(hazard_scenarios()) * seeds, seeds)
         sweep(prepared, every, SweepLog(out / "sweep.jsonl", asked, _say), origin, as_json=as_json)

@@ -7,12 +7,13 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Final, TypeAlias
+from typing import Any, TypeAlias
 
 from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.launch import FlightInterruptedError, fly
 from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.sweep_log import SweepLog, SweptRow
+from flightd.app.simulation.sweep_routes import SweepRoute, route_of
 from flightd.core.errors import FlightdError
 from flightd.core.snapshot import Snapshot
 from flightd.core.utc_time import utc_day
@@ -22,11 +23,8 @@ from flightd.sim.judge.hazard_verdict import HazardVerdict
 from flightd.sim.scenario.scenario import Scenario
 from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
 
-SHORT_ROUTE: Final = 'mission.nodes=["A2", "A4"]'
-"""On the demo site, past the place where the shipped faults begin."""
-
-Prepare: TypeAlias = Callable[[Scenario, str, int], Simulation]
-"""Makes the flight of a scenario, its name and a seed."""
+Prepare: TypeAlias = Callable[[Scenario, str, int, SweepRoute], Simulation]
+"""Makes the flight of a scenario that is laid on a route, its name, a seed and the route."""
 Observe: TypeAlias = Callable[[str, Simulation], AbstractContextManager[Callable[[Snapshot], None]]]
 """Gives, for the scenario that is flown now, what looks on."""
 
@@ -55,24 +53,26 @@ def as_it_should(row: Mapping[str, Any]) -> bool:
 def fly_every_hazard(
     prepare: Prepare, observe: Observe, seeds: Sequence[int], log: SweepLog, origin: Origin
 ) -> Iterator[SweptRow]:
-    """Fly what `prepare` makes of each hazard's shipped scenarios with each seed, in the table's order; those
-    in `log` are told as they were.  What goes wrong with one is its row's error.  FlightInterruptedError when
-    a signal ends it all."""
+    """Fly what `prepare` makes of each hazard's shipped scenarios with each seed, on the seed's route, in the
+    table's order; those in `log` are told as they were.  What goes wrong with one is its row's error.
+    FlightInterruptedError when a signal ends it all."""
     paths = shipped_scenarios()
     for name, hazard in hazard_scenarios().items():
-        scenario = load_scenario(paths[name])
+        shipped = load_scenario(paths[name])
         for seed in seeds:
+            route = route_of(seed, shipped)
             row = log.row(name, seed)
             if row is None:
                 try:
                     with raised_signals(_interrupted):
-                        simulation = prepare(scenario, name, seed)
+                        simulation = prepare(route.laid(shipped), name, seed, route)
                 except FlightInterruptedError:
                     raise
                 except FlightdError as err:
-                    row = _row(name, _unjudged(hazard), str(err), scenario.needs_real_time, seed, origin)
+                    row = _row(name, _unjudged(hazard), str(err), shipped.needs_real_time, seed, origin)
                 else:
                     row = _flown(name, hazard, simulation, observe, origin)
+                row |= {"route": route.name}
                 log.append(row)
             yield row
 

@@ -15,8 +15,8 @@ from flightd.app.simulation.prepare import SimOptions
 from flightd.core.errors import InputError, cannot_write
 
 SweptRow: TypeAlias = dict[str, Any]
-"""One flight of a sweep as JSON has it: its `HazardVerdict` (`hazard` is the scenario's name), seed, day and
-`Origin`, whether it went by the clock, and why it ended early or was not judged ("" where it was)."""
+"""One flight of a sweep as JSON has it: its `HazardVerdict` (`hazard` is the scenario's name), seed, route,
+day and `Origin`, whether it went by the clock, and why it ended early or was not judged ("" where it was)."""
 
 
 def asked_of(options: SimOptions, flights: int, seeds: int) -> dict[str, Any]:

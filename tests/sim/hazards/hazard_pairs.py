@@ -18,13 +18,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from flightd.app.simulation.flown_code import flown_code
 from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.launch import fly
 from flightd.app.simulation.prepare import SimOptions, prepare
-from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+from flightd.app.simulation.sweep_routes import ACROSS, ALONG, ROUTES, SweepRoute
 from flightd.cli.scenario_sweep import faults_in_words
 from flightd.core.errors import RunError
 from flightd.sim.judge.flight_score import FlightScore
@@ -83,12 +83,14 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     lambda draw: {"kind": "aisle_opened"},
     lambda draw: {
         "kind": "bare_floor",
-        "at_node": draw.choice(["A2", "A3", "A4"]),
+        "at_node": "",  # of the route
         "half_m": round(draw.uniform(0.5, 4.0), 2),
     },
     lambda draw: {"kind": "camera_disordered", "delay_s": round(draw.uniform(0.05, 0.2), 2)},
 )
 """All that a lockstep flight can have, each as strong as the table of hazards claims to bear."""
+PASSED: Final[dict[SweepRoute, tuple[str, ...]]] = {ALONG: ("A2", "A3", "A4"), ACROSS: ("B1", "B2")}
+"""Where the floor may be bare."""
 _UNSAFE = SAFETY_KINDS | {"record_lost"}
 """None of them takes the disk away: no record is lost either."""
 
@@ -119,24 +121,29 @@ class FlownPair:
         return f"{self.seed}: {self.faults}: {self.ended}: {words}"
 
 
+def pair_route(seed: int) -> SweepRoute:
+    return ROUTES[1 - seed % 2]
+
+
 def draw_pair(seed: int) -> Scenario:
     """Two different kinds of fault, each for good or for a while, or at a place."""
     draw = random.Random(seed)
+    nodes = PASSED[pair_route(seed)]
     faults = []
     for make in draw.sample(_KINDS, 2):
         lasts_s = math.inf if draw.random() < 0.5 else round(draw.uniform(*_LASTS_S), 2)
         when = {"at_s": round(draw.uniform(*_MOMENTS_S), 2), "duration_s": lasts_s}
         fault = make(draw)
-        faults.append(fault if "at_node" in fault else when | fault)
+        faults.append(fault | {"at_node": draw.choice(nodes)} if "at_node" in fault else when | fault)
     return Scenario.model_validate({"fault": faults})
 
 
 def fly_pair(seed: int, folder: Path, vehicle: str) -> FlownPair:
-    """Fly it on the demo site, with wind and sensors of the same seed."""
+    """Fly it on the seed's route, with wind and sensors of the same seed."""
     scenario = draw_pair(seed)
     # one that waits on its pad for a fresh battery waits for ever
     options = SimOptions(seed=seed, vehicle=vehicle, settings=["battery.swap=false"])
-    simulation = prepare(options, scenario, folder, lambda _: None, sweep_route=SHORT_ROUTE)
+    simulation = prepare(options, scenario, folder, lambda _: None, sweep_route=pair_route(seed).setting)
     ended = ""
     try:
         fly(simulation)

@@ -12,7 +12,7 @@ import pytest
 from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.launch import fly
 from flightd.app.simulation.prepare import SimOptions, prepare
-from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+from flightd.app.simulation.sweep_routes import ALONG
 from flightd.config.schema import load_config
 from flightd.core.topics import Topic
 from flightd.core.types import Phase
@@ -58,7 +58,9 @@ def test_features_carry_a_drone_whose_range_finder_fails_where_no_line_is(tmp_pa
         {"kind": "height_quality", "at_s": 19.99, "duration_s": 14.04},
     ]
     scenario = with_small_camera(Scenario.model_validate({"fault": faults}))
-    simulation = prepare(SimOptions(seed=60797), scenario, tmp_path, lambda _: None, sweep_route=SHORT_ROUTE)
+    simulation = prepare(
+        SimOptions(seed=60797), scenario, tmp_path, lambda _: None, sweep_route=ALONG.setting
+    )
     fly(simulation)
     judgement = judge_flight(simulation)
     assert not [fault for fault in judgement.faults if fault.kind in SAFETY_KINDS]

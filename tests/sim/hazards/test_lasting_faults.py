@@ -14,7 +14,7 @@ import pytest
 from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.launch import FlightInterruptedError, fly
 from flightd.app.simulation.prepare import SimOptions, prepare
-from flightd.app.simulation.scenario_sweep import SHORT_ROUTE
+from flightd.app.simulation.sweep_routes import ALONG
 from flightd.core.errors import RunError
 from flightd.core.snapshot import Snapshot
 from flightd.core.topics import Topic
@@ -46,7 +46,7 @@ def flown_since(
     """The true motion from two seconds after a fault on the leg along y = 0 began; nothing is unsafe."""
     scenario = with_small_camera(Scenario.model_validate({"fault": [{"at_x_m": 2.3, "at_y_m": 0.0} | fault]}))
     simulation = prepare(
-        SimOptions(seed=11, settings=AT_ONCE), scenario, folder, lambda _: None, sweep_route=SHORT_ROUTE
+        SimOptions(seed=11, settings=AT_ONCE), scenario, folder, lambda _: None, sweep_route=ALONG.setting
     )
     try:
         fly(replace(simulation, observer=observer))

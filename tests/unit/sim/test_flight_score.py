@@ -227,6 +227,15 @@ def test_armed_on_the_floor_for_long_and_in_the_air_at_the_end_are_bad() -> None
     assert kinds(evidence([at(0), at(S)], [DONE]))["stayed_up"] == pytest.approx(1.6)
 
 
+def test_one_that_disarms_as_the_truth_ends_has_disarmed() -> None:
+    down = landed(at(S), at(7 * S))
+    last_s = down[-1].stamp_ns * 1e-9
+    for off_s, stays in ((last_s - 0.2, False), (last_s + 0.01, False), (None, True)):
+        off = [] if off_s is None else [ArmedChange(round(off_s * S), armed=False)]
+        found = kinds(evidence(down, [DONE], armed=[ArmedChange(0, armed=True), *off]))
+        assert ("stayed_armed" in found) is stays
+
+
 @pytest.mark.parametrize(
     ("armed_s", "worst_s"),
     [
