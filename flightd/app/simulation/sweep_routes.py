@@ -40,8 +40,9 @@ class SweepRoute:
 
 ALONG: Final = SweepRoute("along", ("A2", "A4"))
 """Past the place where the shipped faults begin."""
-ACROSS: Final = SweepRoute("across", ("B1", "B2"), (0.0, 1.3))
-"""A fault begins where the drone comes between the racks' ends."""
+ACROSS: Final = SweepRoute("across", ("A1", "B1", "B2"), (0.0, 1.3))
+"""A fault begins where the drone comes between the racks' ends, one stop behind it: on a battery that has
+done nothing no other one would follow."""
 ROUTES: Final = (ALONG, ACROSS)
 
 
