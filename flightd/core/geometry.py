@@ -56,9 +56,13 @@ def heading_rotation(yaw_rad: float) -> Matrix:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def yaw_rate(roll_rad: float, pitch_rad: float, pitch_radps: float, yaw_radps: float) -> float:
-    """Rate of the yaw (rad/s) from the body's rates about its y and z axes."""
-    return (pitch_radps * math.sin(roll_rad) + yaw_radps * math.cos(roll_rad)) / math.cos(pitch_rad)
+def angle_rates(
+    roll_rad: float, pitch_rad: float, body_radps: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Rates of yaw, roll and pitch (rad/s) from the body's rates about its x, y and z axes."""
+    (about_x, about_y, about_z), sin, cos = body_radps, math.sin(roll_rad), math.cos(roll_rad)
+    yaw = (about_y * sin + about_z * cos) / math.cos(pitch_rad)
+    return yaw, about_x + yaw * math.sin(pitch_rad), about_y * cos - about_z * sin
 
 
 def quaternion_of(rotation: Matrix) -> tuple[float, float, float, float]:

@@ -214,17 +214,28 @@ class CodeRead:
 class Attitude:
     """Body to level frame: roll + right side down, pitch + nose up, yaw + clockwise from above.
 
-    `yaw_rate_radps` is the rate of the yaw by the gyros alone, NaN where the vehicle tells none."""
+    The rates are those of the three angles by the gyros alone, NaN where the vehicle tells none."""
 
     stamp_ns: int
     roll_rad: float
     pitch_rad: float
     yaw_rad: float
     yaw_rate_radps: float = math.nan
+    roll_rate_radps: float = math.nan
+    pitch_rate_radps: float = math.nan
 
     def turned_to(self, yaw_rad: float) -> Attitude:
         """The same with another heading."""
-        return Attitude(self.stamp_ns, self.roll_rad, self.pitch_rad, yaw_rad, self.yaw_rate_radps)
+        return Attitude(self.stamp_ns, self.roll_rad, self.pitch_rad, yaw_rad, *self._rates)
+
+    def leant_by(self, roll_rad: float, pitch_rad: float) -> Attitude:
+        """The same with so much more roll and pitch."""
+        roll, pitch = self.roll_rad + roll_rad, self.pitch_rad + pitch_rad
+        return Attitude(self.stamp_ns, roll, pitch, self.yaw_rad, *self._rates)
+
+    @property
+    def _rates(self) -> tuple[float, float, float]:
+        return self.yaw_rate_radps, self.roll_rate_radps, self.pitch_rate_radps
 
 
 class LandedState(enum.StrEnum):

@@ -190,8 +190,8 @@ class StateEstimator:
         and fades.  By what the picture makes of it later nobody flies level."""
         lasts_s = self._config.tracking.expert.priors.attitude_s
         left = math.exp(-(now_ns - self._stood_ns) * 1e-9 / lasts_s)
-        roll_rad, pitch_rad = self._level_rad
-        return left * roll_rad, left * pitch_rad
+        (roll_rad, pitch_rad), lead = self._level_rad, self.tracker.lead_rad
+        return left * roll_rad - lead.roll_rad, left * pitch_rad - lead.pitch_rad
 
     def _mind_jitter(self, late_s: float) -> None:
         late_s = min(max(late_s, 0.0), _MOST_JITTER_S)
@@ -294,9 +294,10 @@ class StateEstimator:
         part = TICK_S / _UNLEANT_S
         x, y = self._unleant
         now_x, now_y = tracker.unleant(now_ns)
-        self._unleant = x + part * (now_x - x), y + part * (now_y - y)
+        self._unleant = x, y = x + part * (now_x - x), y + part * (now_y - y)
         ease = min(max(_FREE_S / total_s, _LEAST_EASE), 1.0)
-        return Conditions(self._unleant, ease, self._level_at(now_ns))
+        leapt_x, leapt_y = tracker.leapt(now_ns)  # what leaps is answered at once
+        return Conditions((x + leapt_x, y + leapt_y), ease, self._level_at(now_ns))
 
     def _take_frame(self, lines: LineSet) -> None:
         exposed_ns, carried = self.tracker.exposed_ns(lines), self._carried

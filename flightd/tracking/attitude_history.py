@@ -8,6 +8,9 @@ from collections.abc import Iterable
 
 from flightd.core.geometry import wrap_pi
 from flightd.core.types import Attitude
+from flightd.tracking.line_sight import Rates
+
+_RATE_NS = 20_000_000
 
 
 class AttitudeHistory:
@@ -48,6 +51,20 @@ class AttitudeHistory:
         """The time of the newest measured sample; 0 before the first."""
         measured = len(self._stamps) - self._assumed
         return self._stamps[measured - 1] if measured else 0
+
+    def rates(self, stamp_ns: int) -> Rates:
+        """How fast roll, pitch and yaw turn at that time, over `_RATE_NS` before and after; 0 where it is not
+        told."""
+        here = self.at(stamp_ns) or self.newest
+        first, last = self.at(stamp_ns - _RATE_NS) or here, self.at(stamp_ns + _RATE_NS) or here
+        dt_s = 0.0 if first is None or last is None else (last.stamp_ns - first.stamp_ns) * 1e-9
+        if first is None or last is None or not dt_s > 0:
+            return Rates(0.0, 0.0, 0.0)
+        return Rates(
+            (last.roll_rad - first.roll_rad) / dt_s,
+            (last.pitch_rad - first.pitch_rad) / dt_s,
+            wrap_pi(last.yaw_rad - first.yaw_rad) / dt_s,
+        )
 
     def _forget_assumed(self) -> None:
         for _ in range(self._assumed):

@@ -15,8 +15,7 @@ def corrected_lens(lens: Lens, held: FloorFilter) -> Lens:
 
 def corrected_attitude(told: Attitude, held: FloorFilter) -> Attitude:
     """The attitude; its yaw stays the vehicle's own."""
-    roll, pitch = told.roll_rad + held.mean(ROLL), told.pitch_rad + held.mean(PITCH)
-    return Attitude(told.stamp_ns, roll, pitch, told.yaw_rad, told.yaw_rate_radps)
+    return told.leant_by(held.mean(ROLL), held.mean(PITCH))
 
 
 def corrected_mount(mount: Mount, held: FloorFilter) -> Mount:

@@ -19,6 +19,7 @@ from flightd.core.tracks import NOT_SEEN, FloorJunction, MarkerOffset, PadOffset
 from flightd.core.types import Attitude, LineSet
 from flightd.tracking.attitude_history import AttitudeHistory
 from flightd.tracking.carried_heading import CarriedHeading
+from flightd.tracking.carried_lean import CarriedLean, Lean
 from flightd.tracking.carried_motion import AT_REST, NO_LEAD, Carried, ExposureMotion, Lead
 from flightd.tracking.corrected_view import corrected_attitude, corrected_lens, corrected_mount
 from flightd.tracking.feature_trust import FeatureTrust, SeenFrame
@@ -30,7 +31,6 @@ from flightd.tracking.heading_dispute import HeadingDispute, Turned
 from flightd.tracking.heading_vote import heading_vote
 from flightd.tracking.line_sight import (
     FeatureSight,
-    Rates,
     as_compensated,
     feature_sight,
     line_sight,
@@ -68,8 +68,6 @@ _HARDLY_RISEN_M = 0.5
 _STANDING_MPS = 0.15
 """Sigma of the speed of what stands or has hardly risen."""
 _ASSUMED_TILT_RAD = math.radians(2.0)
-_RATE_NS = 20_000_000
-"""The told attitude's rates are taken over so long before and after."""
 _DEFAULTS = TrackingConfig()
 
 
@@ -101,6 +99,7 @@ class LineTracker:
         self._start_yaw_rad = start_yaw_rad
         self._history, self._as_told = AttitudeHistory(), AttitudeHistory()
         self._carried_heading, self._judge = CarriedHeading(), GyroJudge()
+        self._carried_lean = CarriedLean(params.priors.attitude_s)
         self._headed = False
         forget_ns = round(params.forget_s * 1e9)
         self._filter = FloorFilter(params.noise, params.priors, params.gate_m, forget_ns, latency_s)
@@ -115,7 +114,6 @@ class LineTracker:
         self._pads: tuple[PadOffset, ...] = ()
         self._junctions: tuple[FloorJunction, ...] = ()
         self._markers: tuple[MarkerOffset, ...] = ()
-        self.rejected = 0
         self._widths, self._near_floor = WidthHeights(), NearFloor()
         self._dispute = HeadingDispute()
         self._knocked = False
@@ -165,6 +163,11 @@ class LineTracker:
         """How well the camera's delay is known."""
         return self._filter.delay_sigma_s
 
+    @property
+    def lead_rad(self) -> Lean:
+        """By how much less roll and pitch is told than gyros have carried on over leaps of them."""
+        return self._carried_lean.lead
+
     def learnt(self) -> LearntSensors | None:
         """What is known of the sensors, for the tracker after this one; None before a line was seen, and once
         the camera was knocked: somebody will put it right."""
@@ -172,8 +175,10 @@ class LineTracker:
 
     def assume(self, samples: Iterable[Attitude]) -> None:
         """Take what is assumed of the attitude from the newest sample on, in the place of what was."""
-        lead_rad = self._carried_heading.lead_rad
-        self._history.assume(sample.turned_to(wrap_pi(sample.yaw_rad + lead_rad)) for sample in samples)
+        lead_rad, lean_by = self._carried_heading.lead_rad, self.lead_rad
+        self._history.assume(
+            sample.turned_to(wrap_pi(sample.yaw_rad + lead_rad)).leant_by(*lean_by) for sample in samples
+        )
 
     def measured(self, lines: LineSet) -> bool:
         """Whether the attitude at the frame's exposure has been told."""
@@ -183,7 +188,7 @@ class LineTracker:
         """Take a sample of telemetry."""
         carried = self._carried_heading.take(sample, watched=sample.stamp_ns - self._lines_ns < _WATCHED_NS)
         self._as_told.add(sample)
-        self._history.add(carried)
+        self._history.add(self._carried_lean.take(carried))
         self._dispute.told(carried)
         if not self._headed:
             self._headed = True
@@ -191,11 +196,13 @@ class LineTracker:
             self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
 
     def stands(self, told_rad: tuple[float, float]) -> tuple[float, float] | None:
-        """The drone stands in that roll and pitch, as they are told; returns those of a drone that is level,
-        None once lines have told of the attitude: then it is no measurement of its own any more."""
+        """The drone stands in that roll and pitch, as they are told; returns those of a level drone, as they
+        are carried, None once lines have told of the attitude: then it is no measurement of its own any
+        more."""
         if self._lines_ns:
             return None
-        self._filter.stand_level(told_rad)
+        roll_rad, pitch_rad = self.lead_rad
+        self._filter.stand_level((told_rad[0] + roll_rad, told_rad[1] + pitch_rad))
         return -self._filter.mean(ROLL), -self._filter.mean(PITCH)
 
     def exposed_ns(self, lines: LineSet) -> int:
@@ -210,11 +217,9 @@ class LineTracker:
         stamp_ns = self.exposed_ns(lines)
         attitude = self._history.at(stamp_ns)
         if attitude is None or not self._headed or lines.stamp_ns <= self._told_ns:
-            self.rejected += 1
             return False
         height_m = self._height_m(lines, attitude, stamp_ns, height_m, climb_mps)
         if not height_m > 0:
-            self.rejected += 1
             return False
         self._told_ns = lines.stamp_ns
         self._stands = self._stands and height_m < _HARDLY_RISEN_M
@@ -235,7 +240,7 @@ class LineTracker:
         )
         sights = [as_compensated(sight, self._compensation) for sight in placed if sight is not None]
         features = self._features(lines, view, yaw)
-        rates, exact = self._rates(stamp_ns), self._compensation is TiltCompensation.EXACT
+        rates, exact = self._history.rates(stamp_ns), self._compensation is TiltCompensation.EXACT
         believed = features if self._trust.holds else []
         for axis in self._filter.update(sights, rates, stamp_ns, believed, assumed=assumed, exact=exact):
             self._features_ns[axis] = stamp_ns
@@ -277,7 +282,7 @@ class LineTracker:
         velocity = held.mean(VX), held.mean(VY)
         yaw = attitude.yaw_rad + held.mean(PSI)
         lens, mount = corrected_lens(self._lens, held), corrected_mount(self._mount, held)
-        motion = ImageMotion.of(self._rates(stamp_ns), velocity, yaw, height_m, mount)
+        motion = ImageMotion.of(self._history.rates(stamp_ns), velocity, yaw, height_m, mount)
         return as_of_one_moment(lines, lens, motion, self._readout_s)
 
     def exposure_motion(self, now_ns: int) -> ExposureMotion | None:
@@ -356,15 +361,29 @@ class LineTracker:
         return Lead(*then.way_m, then_vx - vx, then_vy - vy, turned, (then_ns - now_ns) * 1e-9)
 
     def unleant(self, now_ns: int) -> tuple[float, float]:
-        """Acceleration along the grid axes (m/s2) that the told lean does not explain: push of the air and
-        error of the told attitude, as they are expected then; drag is not in it."""
+        """Acceleration along the grid axes (m/s2) that the lean, as it is carried, does not explain: push of
+        the air and error of the attitude, as they are expected then; drag is not in it."""
         if self._stands:
             return 0.0, 0.0
         held, told = self._filter, self._attitude_at(now_ns)
-        as_told = lean(held.without_errors(), Told(told.roll_rad, told.pitch_rad, told.yaw_rad))[0]
-        (ax, ay), ahead_s = self._accel(now_ns), (now_ns - self._stamp_ns) * 1e-9
+        as_told, ahead_s = self._leant(told), (now_ns - self._stamp_ns) * 1e-9
+        ax, ay = held.accel(Told(told.roll_rad, told.pitch_rad, told.yaw_rad))
         push = held.push_after(0, ahead_s), held.push_after(1, ahead_s)
         return ax - as_told[0] + push[0], ay - as_told[1] + push[1]
+
+    def leapt(self, now_ns: int) -> tuple[float, float]:
+        """Acceleration along the grid axes (m/s2) that the told lean leaves out since it leapt."""
+        if not any(self.lead_rad):
+            return 0.0, 0.0
+        carried = self._attitude_at(now_ns)
+        x, y = self._leant(carried)
+        told_x, told_y = self._leant(carried.leant_by(*(-lead for lead in self.lead_rad)))
+        return x - told_x, y - told_y
+
+    def _leant(self, lean_of: Attitude) -> tuple[float, float]:
+        """Acceleration along the grid axes that such a lean makes, were it free of errors."""
+        told = Told(lean_of.roll_rad, lean_of.pitch_rad, lean_of.yaw_rad)
+        return lean(self._filter.without_errors(), told)[0]
 
     def _carried_to(self, now_ns: int) -> Carried:
         """The motion from the newest frame on; a longer blindness than is remembered is not bridged by
@@ -447,11 +466,6 @@ class LineTracker:
         assert attitude is not None
         return attitude
 
-    def _accel(self, stamp_ns: int) -> tuple[float, float]:
-        """Acceleration along the grid axes that the attitude makes at constant height, g tan(tilt)."""
-        told = self._attitude_at(stamp_ns)
-        return self._filter.accel(Told(told.roll_rad, told.pitch_rad, told.yaw_rad))
-
     def _view(self, attitude: Attitude, stamp_ns: int, height_m: float, lens: Lens) -> FloorView:
         """How the floor was seen from that height through that lens, by what has been learnt of attitude and
         mount."""
@@ -461,19 +475,6 @@ class LineTracker:
         mount = corrected_mount(self._mount, self._filter)
         corrected = corrected_attitude(attitude, self._filter)
         return FloorView(lens, mount, corrected, height_m, self._compensation, sigma_tilt_rad)
-
-    def _rates(self, stamp_ns: int) -> Rates:
-        before, after = self._history.at(stamp_ns - _RATE_NS), self._history.at(stamp_ns + _RATE_NS)
-        here = self._attitude_at(stamp_ns)
-        first, last = before or here, after or here
-        dt_s = (last.stamp_ns - first.stamp_ns) * 1e-9
-        if not dt_s > 0:
-            return Rates(0.0, 0.0, 0.0)
-        return Rates(
-            (last.roll_rad - first.roll_rad) / dt_s,
-            (last.pitch_rad - first.pitch_rad) / dt_s,
-            wrap_pi(last.yaw_rad - first.yaw_rad) / dt_s,
-        )
 
     def _settle_dispute(self, on_floor: list[GroundLine], attitude: Attitude) -> None:
         """Believe lines that outvote the heading for long: it, or the camera's mount, has turned."""

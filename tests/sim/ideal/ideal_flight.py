@@ -15,7 +15,7 @@ from flightd.app.publishers import TelemetryPublishers
 from flightd.app.tick import Tick
 from flightd.config.schema import Config
 from flightd.core.flight_order import FlightOrder
-from flightd.core.geometry import wrap_pi, yaw_rate
+from flightd.core.geometry import angle_rates, wrap_pi
 from flightd.core.scanning import CodeSet, CountedPlace
 from flightd.core.snapshot import Snapshot
 from flightd.core.tick import TickOutput
@@ -348,10 +348,10 @@ class IdealFlight:
 
     def _attitude(self) -> Attitude:
         s = self.sensors
-        _, pitch_radps, yaw_radps = s.body_rates_radps(self.airframe.kinematics(self._now_ns))
-        felt_radps = yaw_rate(s.roll_rad, s.pitch_rad, pitch_radps, yaw_radps)
+        body_radps = s.body_rates_radps(self.airframe.kinematics(self._now_ns))
+        felt_radps = angle_rates(s.roll_rad, s.pitch_rad, body_radps)
         told_rad = wrap_pi(s.yaw_rad + self.faults.yaw_rad)
-        return Attitude(self._now_ns, s.roll_rad, s.pitch_rad, told_rad, felt_radps)
+        return Attitude(self._now_ns, s.roll_rad, s.pitch_rad, told_rad, *felt_radps)
 
     def _state(self) -> VehicleState | None:
         if self.faults.untold:

@@ -66,6 +66,25 @@ def test_a_camera_turned_in_its_mount_and_a_wrong_focal_length_are_flown_by() ->
     assert rms_off_line(result, SITE) < 0.04
 
 
+@pytest.mark.parametrize("leap_deg", [(3.0, -3.0), (-3.0, 0.0)])
+def test_an_attitude_that_leaps_and_leaps_back_in_flight_is_flown_by(leap_deg: tuple[float, float]) -> None:
+    """An autopilot that changes from one estimator to another; beside the ends of racks there are 0.3 m."""
+    wind = WindParams(gust_rms_mps=0.3)
+    flight = IdealFlight(SITE, CONFIG, visits=("B2",), wind=wind, unknowns=Unknowns(path_jitter_s=0.005))
+    fault = flight.sensors.fault
+
+    def leap(_: Phase, _now_ns: int) -> None:
+        on_way = 0.8 < flight.airframe.y_m < 1.8
+        fault.roll_rad, fault.pitch_rad = (math.radians(one) if on_way else 0.0 for one in leap_deg)
+
+    flight.on_tick = leap
+    result = flight.fly(150.0)
+    assert (result.phase, result.visited) == (Phase.DONE, ["B2"]), result.reason
+    across = [truth for _, truth in result.truth if 0.6 < truth.y_m < 2.4]
+    assert max(abs(truth.x_m) for truth in across) < 0.15
+    assert not [event.text for event in result.events if event.name == "hazard"]
+
+
 def drifted_m(unknowns: Unknowns, seed: int) -> float:
     """How far a take-off leaves its pad."""
     result = flown(unknowns, seed)

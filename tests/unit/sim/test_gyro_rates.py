@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightd.core.geometry import yaw_rate
+from flightd.core.geometry import angle_rates
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 
@@ -17,7 +17,7 @@ _RATE = st.floats(-2.0, 2.0)
 
 
 @given(roll=_LEAN, pitch=_LEAN, roll_speed=_RATE, pitch_speed=_RATE, yaw_speed=_RATE)
-def test_the_rate_of_the_yaw_is_found_in_what_gyros_of_a_leaning_body_feel(
+def test_the_rates_of_the_angles_are_found_in_what_gyros_of_a_leaning_body_feel(
     roll: float, pitch: float, roll_speed: float, pitch_speed: float, yaw_speed: float
 ) -> None:
     airframe = Airframe()
@@ -25,8 +25,8 @@ def test_the_rate_of_the_yaw_is_found_in_what_gyros_of_a_leaning_body_feel(
     airframe.roll_speed_radps, airframe.pitch_speed_radps = roll_speed, pitch_speed
     airframe.yaw_speed_radps = yaw_speed
     k = airframe.kinematics(0)
-    told = yaw_rate(roll, pitch, k.pitch_rate_radps, k.yaw_rate_radps)
-    assert told == pytest.approx(yaw_speed, abs=1e-9)
+    told = angle_rates(roll, pitch, (k.roll_rate_radps, k.pitch_rate_radps, k.yaw_rate_radps))
+    assert told == pytest.approx((yaw_speed, roll_speed, pitch_speed), abs=1e-9)
 
 
 def test_simulated_gyros_drift_as_the_told_heading_and_err_in_scale() -> None:

@@ -13,7 +13,7 @@ from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.newest_readings import REBOOT_MS, NewestReadings, has_rebooted
 from flightd.adapters.vehicle.range_finders import RangeSample
-from flightd.core.geometry import yaw_rate
+from flightd.core.geometry import angle_rates
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
@@ -149,8 +149,9 @@ class MavlinkTelemetry(NewestReadings):
         self._stamps_refused += rebooted or senseless
         last_ns = stamp_ns - 1 if self._attitude is None or rebooted else self._attitude.stamp_ns
         if stamp_ns >= last_ns:
-            turn = yaw_rate(message.roll, message.pitch, message.pitchspeed, message.yawspeed)
-            self._attitude = sample = Attitude(stamp_ns, *angles, yaw_rate_radps=turn)
+            body_radps = message.rollspeed, message.pitchspeed, message.yawspeed
+            rates = angle_rates(message.roll, message.pitch, body_radps)
+            self._attitude = sample = Attitude(stamp_ns, *angles, *rates)
             if stamp_ns > last_ns:
                 self._attitudes.append(sample)
         return rebooted

@@ -14,12 +14,12 @@ from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.telemetry import cells_of, range_sample
 from flightd.adapters.vehicle.mavsdk.library import real_fields, whole_fields
 from flightd.adapters.vehicle.newest_readings import REBOOT_MS, NewestReadings, has_rebooted
-from flightd.core.geometry import yaw_rate
+from flightd.core.geometry import angle_rates
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
 _CLIMB_STALE_NS = 500_000_000
-_ATTITUDE_FIELDS = ("time_boot_ms", "roll", "pitch", "yaw", "pitchspeed", "yawspeed")
+_ATTITUDE_FIELDS = ("time_boot_ms", "roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
 _RANGE_FIELDS = ("id", "orientation", "current_distance", "min_distance", "max_distance")
 
 _MODES = {int(mode): mode for mode in FlightMode}
@@ -64,7 +64,7 @@ class MavsdkTelemetry(NewestReadings):
             or not all(abs(angle) <= math.tau for angle in told[1:4])
         ):
             return  # NaN too
-        boot_ms, (roll, pitch, yaw, *rates) = int(told[0]), told[1:]
+        boot_ms, (roll, pitch, yaw, *body_radps) = int(told[0]), told[1:]
         rebooted = has_rebooted(boot_ms, self._boot_ms)
         if rebooted:
             self._sync.reset()
@@ -79,7 +79,9 @@ class MavsdkTelemetry(NewestReadings):
         if self._attitude is not None and not rebooted:
             in_order = in_order and stamp_ns > self._attitude.stamp_ns
         if in_order:
-            self._attitude = Attitude(stamp_ns, roll, pitch, yaw, yaw_rate(roll, pitch, *rates))
+            about_x, about_y, about_z = body_radps
+            rates = angle_rates(roll, pitch, (about_x, about_y, about_z))
+            self._attitude = Attitude(stamp_ns, roll, pitch, yaw, *rates)
             self._attitudes.append(self._attitude)
 
     def take_range(self, document: str, now_ns: int) -> None:
