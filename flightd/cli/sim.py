@@ -94,8 +94,9 @@ def sim(
     """Fly a whole mission in the simulator and leave its log, report and summary.
 
     Exit code 0 where the simulator's judge calls the flight good, else 1.  Interrupted (Ctrl-C, SIGTERM),
-    it leaves what was flown so far, with 128 and the signal's number.  Of --scenario all each flight's row
-    is in OUT/sweep.jsonl as soon as it ended; interrupted, the same command goes on with the rest."""
+    it leaves what was flown so far, with 128 and the signal's number; a second time, it ends at once.
+    Of --scenario all each flight's row is in OUT/sweep.jsonl as soon as it ended; interrupted, the same
+    command goes on with the rest."""
     from flightd.app.simulation.prepare import SimOptions
 
     options = SimOptions(
@@ -154,6 +155,7 @@ def _fly(simulation: Simulation, *, as_json: bool) -> None:
     from flightd.cli.flight_progress import FlightProgress
     from flightd.cli.scenario_sweep import faults_in_words
     from flightd.replay.report.page import write_report
+    from flightd.runtime.ending_signals import end_at_once_on_signals
     from flightd.studies.counted_stock import counted_beside
 
     started = time.monotonic()
@@ -162,6 +164,7 @@ def _fly(simulation: Simulation, *, as_json: bool) -> None:
         try:
             result = fly(replace(simulation, observer=progress))
         except FlightInterruptedError as err:
+            end_at_once_on_signals()  # its report takes a while, too
             if err.result is None:
                 _say(str(err))
                 raise typer.Exit(128 + err.signal) from None

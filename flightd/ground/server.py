@@ -154,8 +154,9 @@ def run(
     hooks: Sequence[Webhook] = (),
     own_fleet: OwnFleet | None = None,
 ) -> signal.Signals | None:
-    """Serve until a signal comes, which is returned.  UnavailableError where the address cannot be had,
-    InputError where it must not be listened at (`check_reach`)."""
+    """Serve until a signal comes, which is returned; a second one ends the process at once.
+    UnavailableError where the address cannot be had, InputError where it must not be listened at
+    (`check_reach`)."""
     check_reach(listening, access, certificate)
     listener, where = opened(listening)
     came: list[signal.Signals] = []
@@ -178,7 +179,7 @@ def run(
                 own_fleet,
             )
         )
-        end_on_signals(serving, came)
+        end_on_signals(serving, came, again_at_once=True)
         with contextlib.suppress(asyncio.CancelledError):
             await serving
 

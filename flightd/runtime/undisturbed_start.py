@@ -27,15 +27,18 @@ def undisturbed() -> Iterator[None]:
 
 @contextmanager
 def _put_off() -> Iterator[None]:
-    """Another thread may take the signal, whose handler then runs in the main one: it runs at the end."""
+    """Another thread may take the signal, whose handler then runs in the main one: it runs at the end.  A
+    loop's own is told by a descriptor, which is silent meanwhile: it would hear of the signal twice."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     came: list[int] = []
+    told = signal.set_wakeup_fd(-1)
     handler = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, handler)
+        signal.set_wakeup_fd(told, warn_on_full_buffer=False)
         if came:
             signal.raise_signal(signal.SIGINT)

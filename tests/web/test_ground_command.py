@@ -7,6 +7,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -106,7 +107,28 @@ def test_it_serves_until_ctrl_c_and_ends_in_order() -> None:
         assert "the ground station is at http://127.0.0.1:" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
         assert process.wait(20) == 0
-        assert process.stderr.read() == "flightd: the ground station was ended by SIGINT\n"
+        assert process.stderr.read() == (
+            "flightd: SIGINT: it ends in order; a second one ends it at once\n"
+            "flightd: the ground station was ended by SIGINT\n"
+        )
+
+
+def test_a_second_ctrl_c_ends_it_at_once_while_it_waits_for_a_page() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "flightd", "ground", "--listen", "127.0.0.1:0"],
+        cwd=ROOT, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stderr is not None
+    with process.stderr:
+        where = re.search(r"127\.0\.0\.1:(\d+)", process.stderr.readline())
+        assert where is not None
+        with socket.create_connection(("127.0.0.1", int(where[1])), timeout=10.0) as page:
+            page.sendall(b"POST /api/site/check HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n\r\n")
+            process.send_signal(signal.SIGINT)
+            assert "it ends in order" in process.stderr.readline()
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20) == 128 + signal.SIGINT
+            assert process.stderr.read() == "flightd: ended at once by SIGINT\n"
 
 
 def test_a_second_station_on_its_state_refuses_to_start_until_the_first_has_died(

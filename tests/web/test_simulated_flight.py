@@ -31,13 +31,14 @@ out = pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
 (out / "pid").write_text(str(os.getpid()))
 assert pathlib.Path(sys.argv[sys.argv.index("--warehouse") + 1]).is_file()
 if STUBBORN:
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: (out / "asked").open("a").write("x"))
 print("hold 0/8 nodes", file=sys.stderr, flush=True)
 if GOOD:
     summary = {"mission": "done", "reason": "all nodes visited", "more": 1}
     (out / "summary.json").write_text(json.dumps(summary))
 else:
-    time.sleep(60)
+    for _ in range(60):
+        time.sleep(1)
 """
 
 
@@ -123,7 +124,7 @@ async def test_a_good_flight_is_told_as_its_summary_has_it_and_may_be_flown_agai
 
 
 @in_real_time
-async def test_the_stations_end_kills_even_one_that_does_not_listen(
+async def test_it_is_told_to_end_once_and_killed_at_the_stations_end_where_it_does_not_listen(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stand_in(monkeypatch, stubborn=True)
@@ -132,8 +133,11 @@ async def test_the_stations_end_kills_even_one_that_does_not_listen(
         below = json.loads((await ask(station, "POST"))[1])["folder"]
         await until(page, last="hold 0/8 nodes")
         pid = int((folder / below / "pid").read_text())
+        for _ in range(2):
+            assert (await ask(station, "DELETE"))[0] == 200
         assert is_alive(pid)
     assert not is_alive(pid)
+    assert (folder / below / "asked").read_text() == "x", "twice would be at once"
 
 
 @in_real_time

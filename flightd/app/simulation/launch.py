@@ -41,7 +41,7 @@ from flightd.core.errors import RunError, UnavailableError
 from flightd.core.topics import Document, Topic
 from flightd.runtime.clock import Hold, LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
-from flightd.runtime.ending_signals import end_on_signals
+from flightd.runtime.ending_signals import end_on_signals, handlers_kept
 from flightd.runtime.event_loops import ScaledLoop, VirtualLoop
 from flightd.runtime.message_channel import Channel
 from flightd.runtime.undisturbed_start import undisturbed
@@ -70,18 +70,20 @@ class FlightInterruptedError(RunError):
 
 def fly(simulation: Simulation) -> FlightResult:
     """Fly it and leave `flight.mcap` and `truth.mcap` in the folder.  RunError when it was ended early, of
-    these FlightInterruptedError by SIGINT or SIGTERM."""
+    these FlightInterruptedError by SIGINT or SIGTERM; where its orderly end takes too long for whoever sends
+    one, a second one ends the process at once."""
     ended_by: list[signal.Signals] = []
-    try:
-        if simulation.speed is None:
-            virtual = VirtualLoop()
-            with asyncio.Runner(loop_factory=lambda: virtual) as runner:
-                return runner.run(_lockstep(simulation, virtual.hold, ended_by))
-        factor = simulation.speed
-        with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
-            return runner.run(_real_time(simulation, factor, ended_by))
-    except asyncio.CancelledError:
-        raise FlightInterruptedError(ended_by[0], None) from None
+    with handlers_kept():
+        try:
+            if simulation.speed is None:
+                virtual = VirtualLoop()
+                with asyncio.Runner(loop_factory=lambda: virtual) as runner:
+                    return runner.run(_lockstep(simulation, virtual.hold, ended_by))
+            factor = simulation.speed
+            with asyncio.Runner(loop_factory=lambda: ScaledLoop(factor)) as runner:
+                return runner.run(_real_time(simulation, factor, ended_by))
+        except asyncio.CancelledError:
+            raise FlightInterruptedError(ended_by[0], None) from None
 
 
 def _this_task() -> asyncio.Task[Any]:
@@ -91,7 +93,7 @@ def _this_task() -> asyncio.Task[Any]:
 
 
 async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Signals]) -> FlightResult:
-    end_on_signals(_this_task(), ended_by)
+    end_on_signals(_this_task(), ended_by, again_at_once=True)
     clock, config, site = LoopClock(), simulation.config, simulation.site
     identity = FlightIdentity.of(simulation.setting, _DRONE, clock.now_ns())
     with ExitStack() as stack:
@@ -139,7 +141,7 @@ async def _opened(
 
 
 async def _real_time(simulation: Simulation, factor: float, ended_by: list[signal.Signals]) -> FlightResult:
-    end_on_signals(_this_task(), ended_by)
+    end_on_signals(_this_task(), ended_by, again_at_once=True)
     clock, config, site = LoopClock(), simulation.config, simulation.site
     ports = free_ports(config)
     peers = peers_at(ports, config, simulation.camera)

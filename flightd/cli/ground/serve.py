@@ -180,7 +180,8 @@ def ground(
     """Watch and command drones in the browser: map, cameras, hazards, events; start, pause, go to, STOP.
 
     It is a client of the ground link, as flightctl is: the drone flies on without it.  While a page is open,
-    it attends the flight; closing the last one is losing the ground (ground.lost_action).  Ctrl-C ends it.
+    it attends the flight; closing the last one is losing the ground (ground.lost_action).  Ctrl-C ends it,
+    a second one at once.
 
     On this machine it asks nobody who he is.  Beyond it everybody signs in, by TLS: see people.
     """

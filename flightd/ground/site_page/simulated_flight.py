@@ -90,7 +90,7 @@ class SimulatedFlight:
         self._asked: asyncio.Queue[_Wanted] = asyncio.Queue(maxsize=1)
         self._process: asyncio.subprocess.Process | None = None
         self._told = SimulationTold(admins_only)
-        self._busy = False
+        self._busy = self._ends = False
         self._tell()
 
     def start(self, site: str, file: Path) -> str:
@@ -120,7 +120,13 @@ class SimulatedFlight:
         """End the one that flies, in order.  RunError where none does."""
         if self._process is None or self._process.returncode is not None:
             raise RunError("no simulated flight is under way")
-        self._process.send_signal(signal.SIGTERM)
+        self._end_in_order(self._process)
+
+    def _end_in_order(self, process: asyncio.subprocess.Process) -> None:
+        """Once: a second signal would end it at once."""
+        if not self._ends and process.returncode is None:
+            self._ends = True
+            process.terminate()
 
     async def run(self) -> None:
         """Serve until cancelled."""
@@ -133,7 +139,7 @@ class SimulatedFlight:
             except OSError as err:
                 last = f"it cannot be started: {err.strerror or err}"
             finally:
-                self._busy, self._process = False, None
+                self._busy, self._ends, self._process = False, False, None
             self._told = msgspec.structs.replace(self._told, drone="", last=last, good=good)
             self._tell()
 
@@ -162,6 +168,7 @@ class SimulatedFlight:
                         self._told = msgspec.structs.replace(self._told, last=last)
                         self._tell()
         finally:
+            self._end_in_order(process)
             await _ended(process)
         return process.returncode == 0
 
@@ -177,11 +184,9 @@ async def _is_over(process: asyncio.subprocess.Process, within_s: float) -> bool
 
 
 async def _ended(process: asyncio.subprocess.Process) -> None:
-    """Have it end in order, and kill it with all that it started where it does not."""
+    """Let it end, and kill it with all that it started where it does not."""
     try:
-        if process.returncode is None:
-            process.terminate()
-            await _is_over(process, _END_S)
+        await _is_over(process, _END_S)
     finally:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)  # its world and detectors, should it have left them

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -21,6 +22,9 @@ from flightd.core.errors import InputError
 from flightd.core.snapshot import Snapshot
 from flightd.sim.scenario.scenario import Scenario
 from flightd.site.site_file import load_site
+from tests.rigs.event_loops import real
+from tests.rigs.processes import of_session
+from tests.rigs.waiting import until
 from tests.sim.ideal.ideal_flight import IdealFlight
 
 ROOT = Path(__file__).parents[3]
@@ -28,9 +32,12 @@ CONFIGS = ROOT / "configs"
 PATIENCE_S = 120.0
 
 
-def started(folder: Path, *options: str) -> subprocess.Popen[str]:
+def started(folder: Path, *options: str, new_session: bool = False) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "flightd", "sim", "--out", str(folder), *options]
-    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=new_session,
+    )  # fmt: skip
 
 
 def until_flown(process: subprocess.Popen[str], log: Path, most_bytes: int = 200_000) -> None:
@@ -59,6 +66,29 @@ def test_an_interrupted_flight_leaves_what_was_flown_so_far(tmp_path: Path, numb
     assert re.fullmatch(rf"interrupted by {number.name} in phase \w+", summary["reason"])
     assert summary["frames"] > 0
     assert "<html" in (tmp_path / "report.html").read_text()
+
+
+def test_a_second_ctrl_c_ends_it_at_once_where_a_disk_keeps_it(tmp_path: Path) -> None:
+    process = started(tmp_path, "--json", new_session=True)
+    assert process.stderr is not None
+    try:
+        until_flown(process, tmp_path / "flight.mcap", 50_000)
+        for pid in of_session(process.pid):
+            if b"recorder.writer_process" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                os.kill(pid, signal.SIGSTOP)
+        process.send_signal(signal.SIGINT)
+        said = "flightd: SIGINT: it ends in order; a second one ends it at once\n"
+        assert said in iter(process.stderr.readline, "")
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(1.0)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(3.0) == 128 + signal.SIGINT
+        real(until(lambda: not of_session(process.pid), 3.0))
+        assert process.stderr.read() == "flightd: ended at once by SIGINT\n"
+    finally:
+        for pid in of_session(process.pid):
+            os.kill(pid, signal.SIGKILL)
+        process.communicate()
 
 
 @pytest.mark.realtime

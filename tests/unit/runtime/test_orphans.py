@@ -10,6 +10,7 @@ from pathlib import Path
 from flightd.adapters.recorder.mcap_repair import is_whole
 from flightd.runtime.child_process import LAST_S
 from tests.rigs.event_loops import real
+from tests.rigs.processes import of_session
 from tests.rigs.waiting import until
 
 ROOT = Path(__file__).parents[3]
@@ -37,16 +38,3 @@ def test_all_children_of_a_killed_daemon_end_by_themselves(tmp_path: Path) -> No
     real(until(lambda: not of_session(daemon.pid), LAST_S + 20.0))
     assert is_whole(tmp_path / "flight.mcap"), "its writer finished it"
     assert (tmp_path / "led" / "brightness").read_text() == "0"
-
-
-def of_session(session: int) -> set[int]:
-    """The processes that were begun in it and live."""
-    found = set()
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            state, _, _, its = stat.read_text().rpartition(") ")[2].split()[:4]
-        except OSError:  # gone meanwhile
-            continue
-        if int(its) == session and state != "Z":
-            found.add(int(stat.parent.name))
-    return found
