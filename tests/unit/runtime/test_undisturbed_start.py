@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 
 from flightd.runtime.undisturbed_start import undisturbed
+from tests.rigs.event_loops import real
 
 BLOCKED = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
 
@@ -41,3 +44,31 @@ def test_an_interrupt_meanwhile_comes_when_the_start_is_done() -> None:
     finally:
         signal.signal(signal.SIGINT, before)
     assert done
+
+
+def test_a_loop_hears_once_of_an_interrupt_that_another_thread_takes_meanwhile() -> None:
+    async def test() -> None:
+        came: list[int] = []
+        loop, begun = asyncio.get_running_loop(), threading.Event()
+
+        def take() -> None:
+            begun.wait()
+            signal.raise_signal(signal.SIGINT)
+
+        taking = threading.Thread(target=take)
+        taking.start()
+        loop.add_signal_handler(signal.SIGINT, came.append, 1)
+        try:
+            with undisturbed():
+                begun.set()
+                taking.join()
+            await asyncio.sleep(0.05)
+        finally:
+            loop.remove_signal_handler(signal.SIGINT)
+        assert came == [1]
+
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        real(test())
+    finally:
+        signal.signal(signal.SIGINT, before)
