@@ -8,11 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from flightd.config.schema import Config
+from flightd.core.errors import TransientError
 from flightd.core.refusal import Refusal
 from flightd.doctor.calibration import check_calibration
 from flightd.doctor.check import Check, CheckLevel, FailedChecks
 from flightd.doctor.labels import check_labels
 from flightd.doctor.machine import check_clock, check_count_clock, check_disk, check_processor
+from flightd.runtime.disk_threads import on_disk
 from flightd.site.site import Site
 
 PERIOD_S = 10.0
@@ -67,9 +69,9 @@ class ComputerCheck:
             await asyncio.sleep(PERIOD_S)
             if not waits():
                 continue
-            looking = asyncio.ensure_future(asyncio.to_thread(self._look))
+            looking = asyncio.ensure_future(on_disk(self._look))
             await asyncio.wait([looking], timeout=PATIENCE_S)
-            if not looking.done():
+            if not looking.done() or isinstance(looking.exception(), TransientError):
                 self._unfit = CheckHangs()
             self._take(await looking)
 

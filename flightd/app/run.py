@@ -9,7 +9,7 @@ import os
 import platform
 import signal
 from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -44,6 +44,7 @@ from flightd.doctor.check import CheckLevel
 from flightd.ports import Ground, Recorder
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
+from flightd.runtime.disk_threads import on_disk
 from flightd.runtime.ending_signals import end_on_signals
 from flightd.runtime.supervisor import restarted
 from flightd.site.site_file import load_site
@@ -209,13 +210,19 @@ async def flown(
             task.cancel()
         await asyncio.wait([flying, leaving, settled])
         if came_up:  # only now: the vehicle was handed back, and the disk may take its time
-            await asyncio.to_thread(file.confirm)
+            await _confirmed(file)
 
 
 async def _settled(file: SettingsFile) -> None:
     """Once the daemon has run for a while its settings are no trial any more."""
     await asyncio.sleep(_COME_UP_S)
-    await asyncio.to_thread(file.confirm)
+    await _confirmed(file)
+
+
+async def _confirmed(file: SettingsFile) -> None:
+    """Where the disk does not answer its settings stay on trial."""
+    with suppress(TransientError):
+        await on_disk(file.confirm)
 
 
 def _failing(config: Config) -> set[str]:

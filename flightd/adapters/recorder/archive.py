@@ -11,6 +11,7 @@ from pathlib import Path
 
 from flightd.adapters.recorder.mcap_repair import is_whole, repair
 from flightd.core.errors import InputError, TransientError, UnavailableError
+from flightd.runtime.disk_threads import on_disk
 
 LOG_NAME = "flight.mcap"
 
@@ -61,11 +62,11 @@ class FlightArchive:
     async def run(self) -> None:
         """Mend what earlier flights left behind, then keep room on the disk, for ever; works in a thread,
         beside the flight.  TransientError when the disk refuses."""
-        await asyncio.to_thread(self.mend)
+        await on_disk(self.mend)
         while True:
             await asyncio.sleep(ROOM_S)
             try:
-                await asyncio.to_thread(self.make_room)
+                await on_disk(self.make_room)
             except OSError as err:
                 text = f"{self._folder}: cannot make room for the flight's log: {err.strerror}"
                 raise TransientError(text) from err

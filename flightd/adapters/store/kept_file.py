@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from flightd.core.errors import TransientError
+from flightd.runtime.disk_threads import on_disk
 from flightd.runtime.durable_files import replace_file
 from flightd.runtime.latest_slot import Latest
 from flightd.runtime.within import Within
@@ -43,12 +44,12 @@ class KeptFile(Generic[T]):
         try:
             while True:
                 await self._changed.get()
-                await asyncio.to_thread(self._write)
+                await on_disk(self._write)
         except asyncio.CancelledError:
             # ending comes before saving what a disk refuses, or takes too long for
             with contextlib.suppress(TransientError, TimeoutError):
                 async with Within(_LAST_WRITE_S):
-                    await asyncio.to_thread(self._write)
+                    await on_disk(self._write)
             raise
 
     def _write(self) -> None:

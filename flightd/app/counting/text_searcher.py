@@ -15,6 +15,7 @@ from flightd.core.errors import TransientError, UnavailableError
 from flightd.core.label_values import LabelValue
 from flightd.runtime.child_process import Child
 from flightd.runtime.clock import Hold
+from flightd.runtime.disk_threads import on_disk
 from flightd.runtime.niceness import give_way
 from flightd.vision.shelf.text_search import BrokenPictureError, TextSearch, search_name
 
@@ -111,11 +112,10 @@ class TextSearcher:
         if found is None:
             self.lost += 1
             return
-        loop = asyncio.get_running_loop()
         try:
             with self._hold():
-                await loop.run_in_executor(None, self._store.keep_texts, observation, found, self._asked)
-        except UnavailableError:
+                await on_disk(self._store.keep_texts, observation, found, self._asked)
+        except (UnavailableError, TransientError):
             self.lost += 1  # the writer of the inventory tells of the disk
             return
         self.searched += 1

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-
 from flightd.adapters.ground_link.messages.maintenance import CheckReport, DoctorAnswer, ExposureReport
 from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.vehicle.mavlink.vehicle import MavlinkVehicle
@@ -20,6 +18,7 @@ from flightd.doctor.beside_daemon import Running, check_here, judge_running
 from flightd.doctor.check import Check, CheckLevel
 from flightd.doctor.exposure import Seen, blur_px
 from flightd.ports import Camera, TellsExposure
+from flightd.runtime.disk_threads import on_disk
 from flightd.site.site import Site
 
 _WATCH_S = 1.0
@@ -40,14 +39,14 @@ class DroneChecks:
 
     async def report(self, request_id: str, flight: Flight, outcome: str = "") -> DoctorAnswer:
         """Look at everything: about a second."""
-        here = await asyncio.to_thread(check_here, self._config, self._site)
+        here = await on_disk(check_here, self._config, self._site)
         found = await self._running(flight)
         checks = [*here, *judge_running(self._config, found)]
         return DoctorAnswer(
             request=request_id,
             fit=not any(check.level is CheckLevel.ERROR for check in checks),
             checks=tuple(_reported(check) for check in checks),
-            versions=await asyncio.to_thread(self._versions, found.firmware),
+            versions=await on_disk(self._versions, found.firmware),
             log=self._log.lines,
             outcome=outcome,
             exposures=exposure_reports(self._config, found.exposure.state, found.front_exposure),

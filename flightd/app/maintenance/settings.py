@@ -32,6 +32,7 @@ from flightd.config.edited_text import edited
 from flightd.config.reference import rows, tables
 from flightd.config.remote_change import Value, checked, differences, fixed_because, value_in
 from flightd.core.errors import InputError, RunError, UnavailableError
+from flightd.runtime.disk_threads import on_disk
 from flightd.runtime.niceness import give_way
 from flightd.runtime.within import Within
 from flightd.vision.lines.colour_profile import read_profile
@@ -58,7 +59,7 @@ class DroneSettings:
 
     async def answer(self, request_id: str) -> SettingsAnswer:
         """The file as it stands, with what its keys mean."""
-        return await asyncio.to_thread(self._answer, request_id)
+        return await on_disk(self._answer, request_id)
 
     async def propose(self, request: ProposeSettings, client: str) -> str:
         """Change keys; what was changed, in words.  InputError where that is no sound configuration."""
@@ -70,7 +71,7 @@ class DroneSettings:
         """Bring a kept version back; what was changed, in words.  InputError where the ground could not
         change the keys in which it differs, or it does not fit the site any more."""
         before = await self._as_seen(request.base)
-        text = await asyncio.to_thread(self._file.text_of, request.version_kept)
+        text = await on_disk(self._file.text_of, request.version_kept)
         try:
             changes = differences(tomllib.loads(before), tomllib.loads(text))
         except tomllib.TOMLDecodeError as err:
@@ -85,9 +86,9 @@ class DroneSettings:
         before = await self._as_seen(request.base)
         if hashlib.sha256(request.content).hexdigest() != request.file_hash:
             raise InputError("the profile is not the one of its hash", remedy="send it again")
-        await asyncio.to_thread(read_profile, request.content, request.name)
+        await on_disk(read_profile, request.content, request.name)
         file, key = sent_name(request.name, request.content), "vision.profile"
-        is_new = await asyncio.to_thread(self._profiles.keep, file, request.content)
+        is_new = await on_disk(self._profiles.keep, file, request.content)
         if value_in(tomllib.loads(before), key) == file:
             return f"{key} is {file} already"
         changes: dict[str, Value] = {key: file}
@@ -95,14 +96,14 @@ class DroneSettings:
             return await self._bring(before, edited(before, changes), changes, client, request.person)
         except InputError:  # nothing names it
             if is_new:
-                await asyncio.to_thread(self._profiles.withdraw, file)
+                await on_disk(self._profiles.withdraw, file)
             raise
 
     async def _as_seen(self, base: str) -> str:
         """The file's text, if it is what the person saw.  RunError where it is not, or nothing can change."""
         if why := self._file.locked():
             raise RunError(why)
-        before = await asyncio.to_thread(self._file.read)
+        before = await on_disk(self._file.read)
         if tag_of(before) != base:
             raise RunError("the settings were changed meanwhile", remedy="look at them again")
         return before
@@ -118,14 +119,14 @@ class DroneSettings:
         await self._check_whole(text)
         noted = tuple(Change(key, value_in(table, key), after) for key, after in sorted(changes.items()))
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
-        await asyncio.to_thread(self._file.replace, before, text, Version(0, now, client, person, noted))
+        await on_disk(self._file.replace, before, text, Version(0, now, client, person, noted))
         return "settings changed: " + ", ".join(
             f"{one.key} {_shown(one.before)} -> {_shown(one.after)}" for one in noted
         )
 
     async def _check_whole(self, text: str) -> None:
         """InputError where a daemon could not start by it.  UnavailableError where the check does not end."""
-        candidate = await asyncio.to_thread(self._file.propose, text)
+        candidate = await on_disk(self._file.propose, text)
         try:
             process = await asyncio.create_subprocess_exec(
                 sys.executable,
@@ -145,13 +146,13 @@ class DroneSettings:
                     process.kill()
                     await process.wait()
         finally:
-            await asyncio.to_thread(self._file.withdraw)
+            await on_disk(self._file.withdraw)
         line = said.decode(errors="replace").strip().rpartition("\n")[2].removeprefix("flightd: ")
         if process.returncode == _INPUT_ERROR:
             raise _without_file(InputError(line), candidate)
         if process.returncode not in {0, 1}:
             raise UnavailableError(f"the check of the settings failed (exit {process.returncode})")
-        if errors := new_errors(found, await asyncio.to_thread(self._unfit)):
+        if errors := new_errors(found, await on_disk(self._unfit)):
             raise InputError("; ".join(errors), remedy="the service would not start by them")
 
     def _answer(self, request_id: str) -> SettingsAnswer:
