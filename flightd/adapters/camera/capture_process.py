@@ -152,6 +152,8 @@ def _environment(settings: Mapping[str, str]) -> Iterator[None]:
 
 def _of_device(source: Source, parent: ChildEnd) -> Iterator[Grabbed]:
     device = cv2.VideoCapture(source.place, cv2.CAP_V4L2)
+    if not device.isOpened():  # a process that a killed daemon left may have it, and gives its setting back
+        return
     device.set(cv2.CAP_PROP_FRAME_WIDTH, source.width_px)
     device.set(cv2.CAP_PROP_FRAME_HEIGHT, source.height_px)
     device.set(cv2.CAP_PROP_FPS, source.fps)

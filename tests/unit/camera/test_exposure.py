@@ -28,6 +28,10 @@ class Device:
         self.values = {cv2.CAP_PROP_AUTO_EXPOSURE: AUTOMATIC, cv2.CAP_PROP_EXPOSURE: usual}
         self._stubborn = stubborn
         self.position_ms = 0.0
+        self.is_open = True
+
+    def isOpened(self) -> bool:  # noqa: N802 - as OpenCV has it
+        return self.is_open
 
     def get(self, prop: int, /) -> float:
         return self.position_ms if prop == cv2.CAP_PROP_POS_MSEC else self.values[prop]
@@ -39,7 +43,7 @@ class Device:
         return True
 
     def grab(self) -> bool:
-        return True
+        return self.is_open
 
     def retrieve(self) -> tuple[bool, np.ndarray]:
         return True, np.zeros((36, 64, 3), np.uint8)

@@ -161,6 +161,24 @@ def test_the_process_that_reads_a_device_tells_how_it_exposes(monkeypatch: pytes
     assert driver.values == AUTOMATIC
 
 
+def test_a_device_that_another_process_has_is_not_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it set would be taken for the device's own setting, and given back at the end."""
+    device, driver, asked = Device(40.0), Driver(AUTOMATIC), list[str]()
+    device.is_open = False
+
+    def controls(place: str) -> closing_nothing:
+        asked.append(place)
+        return closing_nothing(V4l2Controls(7, driver))
+
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: device)
+    monkeypatch.setattr(capture_process, "controls_of", controls)
+    (reads, writes) = socket.socketpair()
+    source = Source(SourceKind.DEVICE, "/dev/video0", 64, 36, 30.0, ORDER)
+    with reads, writes, closing(frames_of(source, ChildEnd(writes))) as frames:
+        assert list(frames) == []
+    assert asked == []
+
+
 class closing_nothing:  # noqa: N801 - used as a function
     """Hands the controls over, as `controls_of` does."""
 
