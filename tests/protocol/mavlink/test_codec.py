@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import random
+import shutil
 import threading
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -220,6 +221,32 @@ def test_time_stamps_are_claimed_on_the_disk_before_they_are_used(tmp_path: Path
     claimed = int(state.read_text()) - GOLDEN_STAMP
     assert 90 * 10**5 <= claimed <= 121 * 10**5, "a restart begins there: not far ahead of the clock"
     assert [path.name for path in tmp_path.iterdir()] == ["stamp"]
+
+
+def test_a_time_stamp_that_cannot_be_written_is_told_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    clock, state = StoppedClock(), tmp_path / "folder" / "stamp"
+    beat = build(GOLDEN[0]["fields"])
+
+    def pack_for(seconds: int) -> None:
+        for _ in range(seconds):
+            clock.ns += 10**9
+            codec.pack(beat)
+            for thread in threading.enumerate():
+                if thread.name == "signing time stamp":
+                    thread.join()
+
+    codec = Codec(1, 191, Signing(KEY, clock, GOLDEN_UNIX_S, state))
+    pack_for(60)
+    (told,) = caplog.messages
+    assert told.startswith(f"vehicle.signing_stamp {state} cannot be written: No such file or directory; ")
+    state.parent.mkdir()
+    pack_for(30)
+    assert state.exists()
+    shutil.rmtree(state.parent)
+    pack_for(60)
+    assert len(caplog.messages) == 2, "it failed anew"
 
 
 def test_the_key_file_must_be_private_and_whole(tmp_path: Path) -> None:

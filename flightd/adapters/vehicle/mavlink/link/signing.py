@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import secrets
 import tempfile
@@ -16,6 +17,7 @@ from flightd.core.errors import InputError
 from flightd.ports import Clock
 from flightd.runtime.durable_files import replace_file
 
+_LOG = logging.getLogger(__name__)
 KEY_BYTES = 32
 
 _EPOCH_UNIX_S = 1_420_070_400
@@ -92,6 +94,7 @@ class Signing:
         self._start = max(signing_time(unix_time_s), _kept(state))
         self._claimed = 0
         self._writer: threading.Thread | None = None
+        self._refused_told = False
         self.refused = 0
 
     def attach(self, mav: Any) -> None:
@@ -115,11 +118,30 @@ class Signing:
             return
         self._claimed = timestamp + _RESERVE
         if ahead < 1:
-            _keep(self._state, self._claimed)
+            self._keep(self._claimed)
             return
-        place = (self._state, self._claimed)
-        self._writer = threading.Thread(target=_keep, args=place, name="signing time stamp", daemon=True)
+        place = (self._claimed,)
+        self._writer = threading.Thread(target=self._keep, args=place, name="signing time stamp", daemon=True)
         self._writer.start()
+
+    def _keep(self, timestamp: int) -> None:
+        """On the disk before this returns.  One that refuses does not stop the flight: it is told once, until
+        it takes the time stamp again."""
+        if self._state is None:
+            return
+        try:
+            _replace(self._state, str(timestamp))
+        except OSError as err:
+            if not self._refused_told:
+                self._refused_told = True
+                _LOG.warning(
+                    "vehicle.signing_stamp %s cannot be written: %s; started anew while its clock is wrong,"
+                    " the autopilot would not believe this computer",
+                    self._state,
+                    err.strerror or err,
+                )
+        else:
+            self._refused_told = False
 
     def decode(self, mav: Any, frame: bytearray) -> Any | None:
         """The message, or None when signature or checksum is wrong.
@@ -159,15 +181,13 @@ def _kept(state: Path | None) -> int:
         raise InputError(f"signing time stamp {state}: {err}: remove the file if the clock is right") from err
 
 
-def _keep(state: Path | None, timestamp: int) -> None:
-    """Replace the file as a whole, on the disk before this returns; a full disk does not stop the flight."""
-    if state is None:
-        return
-    with contextlib.suppress(OSError):
-        fd, name = tempfile.mkstemp(dir=state.parent, prefix=state.name)
-        try:
-            os.close(fd)
-            replace_file(state, Path(name), str(timestamp).encode("ascii"))
-        except OSError:
+def _replace(state: Path, text: str) -> None:
+    """The file as a whole, on the disk before this returns.  OSError when that refuses."""
+    fd, name = tempfile.mkstemp(dir=state.parent, prefix=state.name)
+    try:
+        os.close(fd)
+        replace_file(state, Path(name), text.encode("ascii"))
+    except OSError:
+        with contextlib.suppress(OSError):  # it may have been moved already
             Path(name).unlink()  # else a full disk gathers one each half minute
-            raise
+        raise
