@@ -63,6 +63,8 @@ _CARRIED_NS = 400_000_000
 """So lately features of the floor must have been followed to carry a position on."""
 _SURE = 0.99
 """Places this likely together say how far a line of the map is."""
+_LEAST = 1e-3
+"""A place less likely than this is none where the drone may be."""
 _CREEP_MPS = 0.1
 """A hover counts as so fast: what carries a position drifts at rest, too."""
 _OTHER_FLOOR = 5e-3
@@ -123,14 +125,14 @@ class GridLocaliser:
         """Whether a map line has been recognised yet in x and in y: before that, position is belief."""
         return self._ever_matched[0], self._ever_matched[1]
 
-    def rivals(self, least: float = 1e-3) -> list[tuple[str, float]]:
+    def rivals(self) -> list[tuple[str, float]]:
         """Every node where the drone may be with its probability, the likeliest first."""
         places = self._places
         by_node: dict[str, float] = {}
         for row in range(1, len(places)):
             node = self._nodes.node(float(places.at_m[row, 0]), float(places.at_m[row, 1])).id
             by_node[node] = by_node.get(node, 0.0) + float(places.weights[row])
-        return sorted(((n, w) for n, w in by_node.items() if w >= least), key=lambda item: -item[1])
+        return sorted(((n, w) for n, w in by_node.items() if w >= _LEAST), key=lambda item: -item[1])
 
     def map_lines(self, axis: int) -> dict[int, float]:
         """Where on the map (m, across the axis) each track is that is surely a line of it, seen from the
@@ -148,12 +150,12 @@ class GridLocaliser:
             if agreed[track] > _SURE
         }
 
-    def way_out(self, least: float = 1e-3) -> tuple[float, float] | None:
-        """A move (dx, dy) along open lines that is safe wherever the drone may be with at least this
-        probability, towards where those places differ; None when there is none."""
+    def way_out(self) -> tuple[float, float] | None:
+        """A move (dx, dy) along open lines that is safe wherever the drone may be, towards where
+        those places differ; None when there is none."""
         places = self._places
         rows = np.argsort(-places.weights)
-        rows = rows[(places.weights[rows] >= least) & (rows != places.best)]
+        rows = rows[(places.weights[rows] >= _LEAST) & (rows != places.best)]
         if 0 in rows:
             return None
         at_m = places.at_m[[places.best, *rows]]

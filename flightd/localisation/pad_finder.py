@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from flightd.core.tracks import TrackSet
 from flightd.core.types import GridPose
 from flightd.site.painted_lines import nearest_end
-from flightd.site.site import PAD_REACH_M, Pad, PadSign, Site
+from flightd.site.site import PAD_REACH_M, PadSign, Site
 
 _SIZE_SHARE = 0.3
 _LEAST_SEEN = 4
@@ -54,6 +54,7 @@ class PadFinder:
 
     def __init__(self, site: Site) -> None:
         self._site = site
+        self._mats = [(pad, site.pad_centre(pad)) for pad in site.pads if pad.sign is PadSign.MAT]
         by_end = [pad for pad in site.pads if pad.sign is PadSign.LINE_END]
         ends = ((pad, nearest_end(site, *site.pad_centre(pad), PAD_REACH_M)) for pad in by_end)
         self._ends = [(pad, end) for pad, end in ends if end is not None]
@@ -73,12 +74,13 @@ class PadFinder:
         held = []
         for sight in tracks.pads:
             x_m, y_m = pose.x_m + sight.x_m, pose.y_m + sight.y_m
-            pad = self._pad_at(x_m, y_m, sight.side_m)
-            if pad is not None:
-                at = self._site.pad_centre(pad)
+            for pad, at in self._mats:
                 off_m = math.hypot(x_m - at[0], y_m - at[1])
-                held.append((off_m, at[0] - sight.x_m, at[1] - sight.y_m))
-                self._found.setdefault(pad.node, _Found()).add(x_m, y_m)
+                fits = abs(sight.side_m - pad.size_m) < _SIZE_SHARE * pad.size_m
+                if fits and off_m < PAD_REACH_M:
+                    held.append((off_m, at[0] - sight.x_m, at[1] - sight.y_m))
+                    self._found.setdefault(pad.node, _Found()).add(x_m, y_m)
+                    break
         if held:  # of several in a frame the nearest to the map's
             _, at_x, at_y = min(held)
             self._hold(at_x, at_y, tracks.pads_ns)
@@ -129,13 +131,3 @@ class PadFinder:
             a.vx_mps + _H * off_x / dt_s,
             a.vy_mps + _H * off_y / dt_s,
         )
-
-    def _pad_at(self, x_m: float, y_m: float, side_m: float) -> Pad | None:
-        for pad in self._site.pads:
-            if pad.sign is not PadSign.MAT:
-                continue
-            at = self._site.pad_centre(pad)
-            near = math.hypot(x_m - at[0], y_m - at[1]) < PAD_REACH_M
-            if near and abs(side_m - pad.size_m) < _SIZE_SHARE * pad.size_m:
-                return pad
-        return None

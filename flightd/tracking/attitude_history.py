@@ -12,17 +12,18 @@ from flightd.tracking.line_sight import Rates
 
 _RATE_NS = 20_000_000
 
+_HOLD_NS = 150_000_000
+
 
 class AttitudeHistory:
-    """Samples of the last seconds; `at` interpolates, and holds the newest for at most `hold_ns`.
+    """Samples of the last seconds; `at` interpolates, and holds the newest for 0.15 s at most.
 
     What is only assumed stands behind the measured samples, and gives way to the next of them however late
     that comes.
     """
 
-    def __init__(self, keep_ns: int = 3_000_000_000, hold_ns: int = 150_000_000) -> None:
+    def __init__(self, keep_ns: int = 3_000_000_000) -> None:
         self._keep_ns = keep_ns
-        self._hold_ns = hold_ns
         self._samples: deque[Attitude] = deque()
         self._stamps: deque[int] = deque()
         self._assumed = 0
@@ -92,7 +93,7 @@ class AttitudeHistory:
         if not stamps or stamp_ns < stamps[0]:
             return None
         if stamp_ns >= (last_ns := stamps[-1]):
-            return samples[-1] if stamp_ns - last_ns <= self._hold_ns else None
+            return samples[-1] if stamp_ns - last_ns <= _HOLD_NS else None
         index = bisect_right(stamps, stamp_ns)
         a, b, a_ns = samples[index - 1], samples[index], stamps[index - 1]
         w = (stamp_ns - a_ns) / (stamps[index] - a_ns)

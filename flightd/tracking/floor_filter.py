@@ -91,12 +91,11 @@ class FloorFilter:
         gate_m: float,
         forget_ns: int,
         latency_s: float = math.inf,
-        max_lines: int = 16,
     ) -> None:
         """`latency_s` is the delay that the frames' stamps assume."""
         self._latency_s = latency_s
         self._noise, self._priors = noise, priors
-        self._gate_m, self._forget_ns, self._max_lines = gate_m, forget_ns, max_lines
+        self._gate_m, self._forget_ns = gate_m, forget_ns
         self._next_id, self.held = 0, list[HeldLine]()
         self._first_sigmas = first_sigmas(noise, priors)
         self._x: Matrix = np.zeros(FIRST_LINE)
@@ -485,7 +484,7 @@ class FloorFilter:
         for held in self.held:
             if held.feature is None and held.is_lost(stamp_ns):
                 held.from_m = held.to_m = 0.0  # where it was in view is no longer known
-        self._drop(forgotten_lines(self.held, is_carried, self._forget_ns, self._max_lines, stamp_ns))
+        self._drop(forgotten_lines(self.held, is_carried, self._forget_ns, stamp_ns))
 
     def _drop(self, lines: set[int] | range) -> None:
         if not lines:

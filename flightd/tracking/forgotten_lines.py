@@ -9,6 +9,8 @@ from flightd.tracking.held_lines import HeldLine
 
 _FEATURES: Final = 6
 """So many features are held across an axis, those seen last, since several detectors take turns."""
+_LINES: Final = 16
+"""And so many lines, of both axes."""
 FEATURE_NS: Final = 500_000_000
 """A feature is not held for longer unseen."""
 
@@ -30,11 +32,10 @@ def forgotten_lines(
     held: Sequence[HeldLine],
     held_on: Callable[[int], bool],
     forget_ns: int,
-    most: int,
     stamp_ns: int,
 ) -> set[int]:
     """The places in `held` of lines, no features, that were not seen for `forget_ns` by then and are not
-    `held_on` nevertheless, only showed for a moment, or are more than `most`."""
+    `held_on` nevertheless, only showed for a moment, or are too many."""
     old, lines = set[int](), list[int]()
     for line, one in enumerate(held):
         if one.feature is not None:
@@ -44,4 +45,4 @@ def forgotten_lines(
         if glimpsed or (stamp_ns - one.seen_ns > forget_ns and not held_on(line)):
             old.add(line)
     lines.sort(key=lambda line: -held[line].seen_ns)
-    return old | set(lines[most:])
+    return old | set(lines[_LINES:])

@@ -19,11 +19,6 @@ class MeantFlight:
     plan: FlightPlan
     choice: CountChoice = ALL
 
-    @property
-    def nodes(self) -> frozenset[str]:
-        """Nodes to visit."""
-        return self.plan.to_visit
-
 
 def meant_flight(simulation: Simulation, flown: FlightLog) -> MeantFlight:
     """The last plan that was ordered over the ground link and taken, as `flown` (its commands and events) has

@@ -52,7 +52,7 @@ def stock_summary(simulation: Simulation, meant: MeantFlight, flight_time_s: flo
     planned = {
         code
         for code, place in truth.items()
-        if place.node in meant.nodes and meant.choice.takes(place.node, at[code].side, at[code].level)
+        if place.node in meant.plan.to_visit and meant.choice.takes(place.node, at[code].side, at[code].level)
     }
     scored = score_stock(truth, records, planned).as_summary()
     hours = flight_time_s / 3600

@@ -6,8 +6,8 @@ import math
 
 from flightd.config.schema import Config
 from flightd.control.oscillation import OscillationMonitor
-from flightd.core.tracks import TrackSet
 from flightd.core.types import GridPose, Health
+from flightd.localisation.state_estimator import Estimate
 from flightd.mission.guidance import Guidance, Guide, Warnings
 from flightd.site.corridor import Corridor
 from flightd.site.site import Site
@@ -58,15 +58,15 @@ class PlausibilityMonitor:
         self,
         now_ns: int,
         dt_s: float,
-        pose: GridPose | None,
-        height_m: float,
-        tracks: TrackSet | None,
+        known: Estimate,
+        *,
         tracker: LineTracker,
         frames: FrameMonitor,
+        climb: ClimbDoubt,
+        height_stuck: bool,
         health: Health,
-        height_stuck: bool = False,
-        climb: ClimbDoubt | None = None,
     ) -> Warnings:
+        pose, height_m, tracks = known.pose, known.height_m, known.tracks
         self._tick_s += min(dt_s / _TICK_MEMORY_S, 1.0) * (dt_s - self._tick_s)
         off_share, off_m = abs(tracker.height_share - 1.0), abs(tracker.height_off_m)
         is_off = off_share > self._height_share or (off_m > _OFF_M and off_share > _OFF_SHARE)
@@ -96,8 +96,8 @@ class PlausibilityMonitor:
             height_doubted=self._doubt,
             height_error_m=tracker.height_off_m,
             height_stuck=height_stuck,
-            climb_wrong=climb is not None and climb.found,
-            climb_error_mps=0.0 if climb is None else climb.error_mps(now_ns),
+            climb_wrong=climb.found,
+            climb_error_mps=climb.error_mps(now_ns),
             push_mps2=math.hypot(*self.push_mps2),
             off_m=self._off_m,
             swings=self.oscillation.swings,

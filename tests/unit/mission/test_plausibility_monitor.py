@@ -8,8 +8,11 @@ import pytest
 
 from flightd.core.geometry import Lens, Mount
 from flightd.core.types import HEALTHY, GridPose
+from flightd.localisation.state_estimator import Estimate
+from flightd.mission.guidance import Warnings
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from flightd.site.site_file import load_site
+from flightd.tracking.climb_doubt import ClimbDoubt
 from flightd.tracking.frame_monitor import FrameMonitor
 from flightd.tracking.line_tracker import LineTracker
 from tests.unit.mission.configured import configured
@@ -48,10 +51,8 @@ def test_back_where_it_is_outside_and_knows_it(y_m: float, sigma_m: float, leads
 def test_a_height_that_width_and_scale_both_contradict_is_doubted(
     told_share: float, scale: float, doubted: bool
 ) -> None:
-    tracker, told_m = _Seen(told_share, scale), 1.5
     monitor = PlausibilityMonitor(SITE, configured())
-    warnings = monitor.step(0, 0.02, None, told_m, None, tracker, FrameMonitor(), HEALTHY)
-    assert warnings.height_doubted is doubted
+    assert told_by(monitor, _Seen(told_share, scale)).height_doubted is doubted
 
 
 def test_a_height_that_was_doubted_is_believed_again_only_once_the_lines_agree_for_a_while() -> None:
@@ -67,8 +68,23 @@ def test_a_height_that_was_doubted_is_believed_again_only_once_the_lines_agree_f
     for share, tells, lasts_s, doubted in steps:
         seen = _Seen(share, 0.0, tells=tells)
         for _ in range(round(lasts_s / 0.02)):
-            warnings = monitor.step(0, 0.02, None, 1.5, None, seen, FrameMonitor(), HEALTHY)
+            warnings = told_by(monitor, seen)
         assert warnings.height_doubted is doubted
+
+
+def told_by(monitor: PlausibilityMonitor, tracker: LineTracker) -> Warnings:
+    """What a tick at 1.5 m warns of, where no line tells the place."""
+    known = Estimate(height_m=1.5, tracks=None, pose=None, by_pad=False)
+    return monitor.step(
+        0,
+        0.02,
+        known,
+        tracker=tracker,
+        frames=FrameMonitor(),
+        climb=ClimbDoubt(),
+        height_stuck=False,
+        health=HEALTHY,
+    )
 
 
 class _Seen(LineTracker):

@@ -53,7 +53,7 @@ def test_the_last_plan_that_was_taken_is_meant_in_its_order(simulation: Simulati
     first, last = (chosen("A2", levels=(1,)), taken(1)), (chosen("A3", "A2", levels=(2,)), taken(2))
     told = meant(simulation, first, last, (chosen("B1"), refused(3)))
     assert [stop.node for stop in told.plan.stops if stop.visit] == ["A3", "A2"]
-    assert told.nodes == {"A2", "A3"}
+    assert told.plan.to_visit == {"A2", "A3"}
     assert told.choice.levels == (2,)
 
 
