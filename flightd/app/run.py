@@ -126,9 +126,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
     config, site, clock = run.setting.config, run.setting.site, LoopClock()
     recent, restarts = RecentLog(), service.is_restarted(os.environ)
     faults = StartupFaults(in_air=run.started_anew)
-    watchers = service.monitors(
-        config.metrics, os.environ, journal=run.journal, recent=recent, do_without=faults.do_without
-    )
+    watchers = service.monitors(config.metrics, os.environ, journal=run.journal, recent=recent, faults=faults)
     maintainer = DroneMaintainer(
         DroneChecks(config, site, f"{run.file.path}, site {site.name}", recent),
         DroneSettings(run.file, run.text, restarts=restarts, unfit=partial(_failing, config)),
@@ -136,10 +134,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
     )
     identity = FlightIdentity.of(run.setting, platform.node(), clock.now_ns())
     async with watchers as monitors, AsyncExitStack() as stack:
-        folder, anew = config.inventory.folder, run.started_anew
-        count = FlightCount(config, site, folder, stack, run=identity.run, in_air=anew)
-        if count.error is not None:
-            faults.do_without(count.error)
+        count = FlightCount(config, site, config.inventory.folder, stack, run=identity.run, faults=faults)
         pool = stack.enter_context(detector_pool(config, site, clock))
         archive = _archive(config)
         recorder: Recorder = NO_RECORDER

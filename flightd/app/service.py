@@ -5,7 +5,7 @@ from __future__ import annotations
 import atexit
 import logging
 import sys
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
@@ -15,8 +15,8 @@ from flightd.adapters.metrics.server import MetricsServer
 from flightd.adapters.recent_log import RecentLog
 from flightd.adapters.systemd import SystemdMonitor
 from flightd.app.armed_mark import ArmedMark
+from flightd.app.startup_faults import ON_GROUND, StartupFaults
 from flightd.config.metrics import MetricsConfig
-from flightd.core.errors import UnavailableError
 from flightd.ports import Monitor
 from flightd.runtime.line_writer import LineWriter
 
@@ -63,10 +63,6 @@ def is_restarted(environment: Mapping[str, str]) -> bool:
     return bool(environment.get("NOTIFY_SOCKET")) and _mark(environment) is not None
 
 
-def _raised(err: UnavailableError) -> None:
-    raise err
-
-
 @asynccontextmanager
 async def monitors(
     settings: MetricsConfig,
@@ -74,10 +70,10 @@ async def monitors(
     *,
     journal: bool,
     recent: RecentLog | None = None,
-    do_without: Callable[[UnavailableError], None] = _raised,
+    faults: StartupFaults = ON_GROUND,
 ) -> AsyncIterator[list[Monitor]]:
     """Who watches the daemon from this machine; `recent` hears of everything that is logged, too.  Where the
-    metrics' port is taken, `do_without` is told, and raises that or not."""
+    metrics' port is taken, the `faults` do without them, or not."""
     found: list[Monitor] = []
     async with AsyncExitStack() as stack:
         if recent is not None:
@@ -96,11 +92,8 @@ async def monitors(
         if settings.listen:
             book = MetricsBook()
             server = MetricsServer(settings.address, book.registry)
-            try:
+            with faults.tolerated():
                 await server.open()
-            except UnavailableError as err:
-                do_without(err)
-            else:
                 stack.push_async_callback(server.close)
                 found.append(book)
         yield found

@@ -15,6 +15,7 @@ from flightd.config.recorder import RecorderConfig
 from flightd.core.processors import usable_cores
 from flightd.core.utc_time import utc_text
 from flightd.doctor.check import Check, error, ok, unseen, warning
+from flightd.doctor.nearest_folder import nearest_there
 
 _TICK_RESOLUTION_S = 0.001
 _OLDEST_YEAR = 2025
@@ -97,8 +98,8 @@ def check_disk(recorder: RecorderConfig) -> Check:
     folder = recorder.folder
     if folder is None:
         return warning("disk", "flights are not recorded", "set recorder.folder")
-    there = next(path for path in (folder, *folder.parents) if path.exists())
     try:
+        there = nearest_there(folder)
         with tempfile.TemporaryFile(dir=there):
             pass
         free_bytes = shutil.disk_usage(there).free

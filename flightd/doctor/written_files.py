@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flightd.config.schema import Config
 from flightd.doctor.check import Check, error, ok
+from flightd.doctor.nearest_folder import nearest_there
 
 
 def check_written(config: Config) -> list[Check]:
@@ -35,9 +36,9 @@ def check_written(config: Config) -> list[Check]:
 def _may_be_written(path: Path) -> bool:
     """The file or folder itself where it is there, and the folder in which it is made or replaced."""
     try:
-        folder = next(above for above in path.absolute().parents if above.exists())
+        folder = nearest_there(path.absolute().parent)
         return folder.is_dir() and _open_to_us(folder) and (not path.exists() or _open_to_us(path))
-    except PermissionError:  # a folder above may not even be searched
+    except OSError:  # a folder above may not even be searched, or the name is too long
         return False
 
 

@@ -12,8 +12,8 @@ from flightd.app.counting.code_readers import ReaderPool, Readers
 from flightd.app.counting.count import Counting
 from flightd.app.counting.store_writer import StoreWriter, nobody, utc_at_zero_ns
 from flightd.app.counting.text_searcher import TextSearcher
+from flightd.app.startup_faults import ON_GROUND, StartupFaults
 from flightd.config.schema import Config
-from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.inventory import PlannedLocation
 from flightd.core.scanning import CountedPlace
 from flightd.doctor.machine import check_count_clock
@@ -28,8 +28,7 @@ _LOG = logging.getLogger(__name__)
 
 class FlightCount:
     """The inventory of one flight, kept in `folder` if one is given, its looks named by `run`.  Raises what
-    the store raises; where the vehicle may be `in_air` already, that is its `error` instead, and nothing is
-    kept."""
+    the store raises, unless the `faults` do without it: then nothing is kept."""
 
     def __init__(
         self,
@@ -39,7 +38,7 @@ class FlightCount:
         stack: ExitStack | AsyncExitStack,
         *,
         run: str,
-        in_air: bool = False,
+        faults: StartupFaults = ON_GROUND,
     ) -> None:
         self._scan = config.scan
         self._stack = stack
@@ -48,17 +47,12 @@ class FlightCount:
         self._counted: tuple[CountedPlace, ...] = ()
         self.newest_ns = 0
         """UTC of the newest look that the inventory had before this flight; 0 without one."""
-        self.error: FlightdError | None = None
         self.scans = counts_shelves(config, site)
         if not self.scans or folder is None:
             return
-        try:
+        with faults.tolerated():
             self._store, self._counted = self._opened(folder, site)
-        except (InputError, UnavailableError) as err:
-            if not in_air:
-                raise
-            self.error = err
-        if in_air:  # on the ground nothing starts before that is put right
+        if faults.in_air:  # on the ground nothing starts before that is put right
             for check in check_count_clock(self.newest_ns):
                 _LOG.warning("%s; %s", check.text, check.remedy)
 

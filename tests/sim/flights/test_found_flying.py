@@ -18,6 +18,7 @@ from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
 from flightd.app.detection.detector_pool import Detection
 from flightd.app.flight_orders import configured_order
+from flightd.app.startup_faults import StartupFaults
 from flightd.config.schema import Config, load_config
 from flightd.core.errors import FlightdError, InputError, UnavailableError
 from flightd.core.snapshot import Snapshot
@@ -250,9 +251,10 @@ def unopened(folder: Path) -> FlightdError:
         counting = config.model_copy(update={"front_camera": front})
         with pytest.raises((InputError, UnavailableError)):
             FlightCount(counting, site, folder, stack, run="1")
-        error = FlightCount(counting, site, folder, stack, run="1", in_air=True).error
-    assert error is not None
-    return error
+        faults = StartupFaults(in_air=True)
+        FlightCount(counting, site, folder, stack, run="1", faults=faults)
+    assert faults.first is not None
+    return faults.first
 
 
 def test_an_inventory_that_cannot_be_opened_lands_a_vehicle_found_flying(tmp_path: Path) -> None:

@@ -154,6 +154,14 @@ def test_the_recorders_folder(tmp_path: Path) -> None:
     assert levels([check_disk(RecorderConfig(folder=file))]) == [CheckLevel.ERROR]
 
 
+def test_a_place_that_the_system_does_not_even_look_at_is_an_error_in_a_line(tmp_path: Path) -> None:
+    place = tmp_path / ("x" * 300) / "kept"
+    disk = check_disk(RecorderConfig(folder=place))
+    files = check_written(config().with_values(inventory={"folder": place}))
+    assert levels([disk, *files]) == [CheckLevel.ERROR, CheckLevel.ERROR]
+    assert disk.text.endswith("cannot be written: File name too long")
+
+
 @pytest.mark.parametrize(
     ("keys", "word"),
     [

@@ -14,6 +14,7 @@ from flightd.app.computer_check import ComputerCheck, look_here
 from flightd.app.counting.count import Counting
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.counting.store_writer import StoreWriter
+from flightd.app.startup_faults import StartupFaults
 from flightd.config.schema import load_config
 from flightd.core.inventory import LocationState, Observation, PlannedLocation
 from flightd.core.refusal import words
@@ -42,8 +43,9 @@ def test_a_date_before_the_newest_look_speaks_against_a_flight(
         store.plan([PlannedLocation(PLACE, SITE.locations[PLACE].node)])
         store.commit(Observation("before", PLACE, newest_ns, LocationState.EMPTY, 0.9))
     with ExitStack() as stack:
-        count = FlightCount(CONFIG, SITE, tmp_path, stack, run="now", in_air=in_air)
-    assert (count.newest_ns, count.error) == (newest_ns, None)
+        faults = StartupFaults(in_air=in_air)
+        count = FlightCount(CONFIG, SITE, tmp_path, stack, run="now", faults=faults)
+    assert (count.newest_ns, faults.first) == (newest_ns, None)
     behind = ahead_ns > 0
     assert ("set the clock" in caplog.text) is (behind and in_air)
     unfit = words(ComputerCheck(partial(look_here, CONFIG, SITE, count.newest_ns)).unfit)
