@@ -7,15 +7,10 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from flightd.config.schema import Config
 from flightd.core.errors import TransientError
 from flightd.core.refusal import Refusal
-from flightd.doctor.calibration import check_calibration
 from flightd.doctor.check import Check, CheckLevel, FailedChecks
-from flightd.doctor.labels import check_labels
-from flightd.doctor.machine import check_clock, check_count_clock, check_disk, check_processor
 from flightd.runtime.disk_threads import on_disk
-from flightd.site.site import Site
 
 PERIOD_S = 10.0
 PATIENCE_S = 5.0
@@ -29,22 +24,6 @@ class CheckHangs(Refusal):
 
     def __str__(self) -> str:
         return "the check of this computer does not end (see whether its disk answers)"
-
-
-def look_at_machine(config: Config) -> list[Check]:
-    """The computer itself.  Blocks for the disk."""
-    return [check_clock(), check_disk(config.recorder), *check_processor(config.vision.workers)]
-
-
-def look_here(config: Config, site: Site, newest_ns: int = 0) -> list[Check]:
-    """All that can be looked at without moving or asking anything; `newest_ns` is the UTC of the inventory's
-    newest look.  Blocks for the disk."""
-    return [
-        *look_at_machine(config),
-        *check_count_clock(newest_ns),
-        *check_calibration(config.camera, site, config.mission.height_m),
-        *check_labels(config, site),
-    ]
 
 
 class ComputerCheck:

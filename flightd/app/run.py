@@ -24,7 +24,7 @@ from flightd.adapters.store.settings_file import SettingsFile
 from flightd.app import service
 from flightd.app.absent_parts import NO_GROUND, NO_RECORDER
 from flightd.app.build import build, detector_pool, ground_link
-from flightd.app.computer_check import ComputerCheck, look_at_machine, look_here
+from flightd.app.computer_check import ComputerCheck
 from flightd.app.counting.count import Counting
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
@@ -41,6 +41,7 @@ from flightd.core.errors import InputError, TransientError
 from flightd.core.learnt import LearntSensors
 from flightd.core.snapshot import Snapshot
 from flightd.doctor.check import CheckLevel
+from flightd.doctor.computer import check_fitness, check_machine
 from flightd.ports import Ground, Recorder
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.datagrams import open_paced_datagrams
@@ -127,14 +128,16 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
     recent, restarts = RecentLog(), service.is_restarted(os.environ)
     faults = StartupFaults(in_air=run.started_anew)
     watchers = service.monitors(config.metrics, os.environ, journal=run.journal, recent=recent, faults=faults)
+    checks = DroneChecks(config, site, f"{run.file.path}, site {site.name}", recent)
     maintainer = DroneMaintainer(
-        DroneChecks(config, site, f"{run.file.path}, site {site.name}", recent),
+        checks,
         DroneSettings(run.file, run.text, restarts=restarts, unfit=partial(_failing, config)),
         restarts=restarts,
     )
     identity = FlightIdentity.of(run.setting, platform.node(), clock.now_ns())
     async with watchers as monitors, AsyncExitStack() as stack:
         count = FlightCount(config, site, config.inventory.folder, stack, run=identity.run, faults=faults)
+        checks.newest_ns = count.newest_ns
         pool = stack.enter_context(detector_pool(config, site, clock))
         archive = _archive(config)
         recorder: Recorder = NO_RECORDER
@@ -170,7 +173,7 @@ async def _fly(run: Run, observer: Callable[[Snapshot], None]) -> FlightResult |
             keep_files=True,
             opener=open_paced_datagrams,
             startup_fault=faults.first,
-            fitness=ComputerCheck(partial(look_here, config, site, count.newest_ns)),
+            fitness=ComputerCheck(partial(check_fitness, config, site, count.newest_ns)),
         )
         daemon, maintainer.flight = Daemon(flight), flight
         if run.taken_back:
@@ -222,7 +225,7 @@ async def _confirmed(file: SettingsFile) -> None:
 
 def _failing(config: Config) -> set[str]:
     """The names of the checks of this computer that fail now.  Blocks for the disk."""
-    return {check.name for check in look_at_machine(config) if check.level is CheckLevel.ERROR}
+    return {check.name for check in check_machine(config) if check.level is CheckLevel.ERROR}
 
 
 @asynccontextmanager

@@ -9,14 +9,9 @@ from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding
 from flightd.config.schema import Config
 from flightd.core.exposure import ExposureState
 from flightd.core.types import VehicleState
-from flightd.doctor.calibration import check_calibration, check_learnt
 from flightd.doctor.check import Check, CheckLevel, error, ok, unseen, warning
 from flightd.doctor.exposure import Seen, check_exposure, check_front_exposure
-from flightd.doctor.labels import check_labels
-from flightd.doctor.machine import check_clock, check_disk, check_processor
 from flightd.doctor.pose import check_pose
-from flightd.doctor.written_files import check_written
-from flightd.site.site import Site
 
 _OLD_S = 3.0
 _SLOW = 0.85
@@ -39,19 +34,6 @@ class Running:
     is_mavlink: bool
     exposure: Seen
     front_exposure: ExposureState | None = None
-
-
-def check_here(config: Config, site: Site) -> list[Check]:
-    """Computer, disk, clock, lens and what was learnt: as before a flight.  Blocks for the disk."""
-    return [
-        check_clock(),
-        check_disk(config.recorder),
-        *check_written(config),
-        *check_processor(config.vision.workers),
-        *check_calibration(config.camera, site, config.mission.height_m),
-        *check_learnt(config),
-        *check_labels(config, site),
-    ]
 
 
 def judge_running(config: Config, found: Running) -> list[Check]:

@@ -13,15 +13,12 @@ from flightd.adapters.vehicle.connect import connect_vehicle
 from flightd.adapters.vehicle.mavlink.examination import ExaminationReport
 from flightd.adapters.vehicle.mavlink.parameter_rule import ParameterFinding
 from flightd.config.schema import Config
-from flightd.doctor import camera, machine, vehicle
-from flightd.doctor.calibration import check_calibration, check_learnt
+from flightd.doctor import camera, vehicle
 from flightd.doctor.check import Check, CheckLevel, ok, warning
+from flightd.doctor.computer import check_computer, check_set_up
 from flightd.doctor.delay import check_delay
 from flightd.doctor.exposure import Seen, check_exposure, check_front_exposure
 from flightd.doctor.ground import GroundListener, check_ground
-from flightd.doctor.label_text import check_text
-from flightd.doctor.labels import check_labels
-from flightd.doctor.lamp import check_lamp
 from flightd.doctor.latency import (
     Stages,
     delay_as_measured,
@@ -31,7 +28,6 @@ from flightd.doctor.latency import (
     with_latency,
 )
 from flightd.doctor.vehicle import Autopilot
-from flightd.doctor.written_files import check_written
 from flightd.ports import Clock
 from flightd.site.site import Site
 from flightd.vision.line_detector import Detector
@@ -96,11 +92,7 @@ class Diagnosis:
 async def examine(subject: Subject) -> Diagnosis:
     """Computer, cameras, ground link and vehicle: some ten seconds.  InputError for wrong addresses, keys."""
     config = subject.config
-    checks = [
-        *_check_machine(subject),
-        *check_calibration(config.camera, subject.site, config.mission.height_m),
-        *check_learnt(config),
-    ]
+    checks = [_configured(subject), *check_computer(config, subject.site)]
     autopilot = Autopilot(())
     watching_front = camera.watch_front(config, subject.clock)  # beside the other, as in flight
     if config.vehicle.kind == "ardrone":
@@ -127,7 +119,9 @@ async def examine(subject: Subject) -> Diagnosis:
 
 async def examine_quickly(subject: Subject) -> Diagnosis:
     """What can be known without waiting for anything."""
-    return Diagnosis([*_check_machine(subject), *check_ground(subject.config.ground, subject.ground)])
+    config = subject.config
+    here = check_set_up(config, subject.site)
+    return Diagnosis([_configured(subject), *here, *check_ground(config.ground, subject.ground)])
 
 
 async def measure_delay(
@@ -156,21 +150,10 @@ async def fix_parameters(found: Diagnosis, config: Config, agreed: Sequence[str]
     return Diagnosis([*rest, *autopilot.checks], autopilot.report, autopilot.fixed)
 
 
-def _check_machine(subject: Subject) -> list[Check]:
-    config, site = subject.config, subject.site
-    text = (
-        f"{subject.path}: site {site.name}, {subject.nodes} nodes to visit at {config.mission.height_m:g} m"
-    )
-    return [
-        ok("config", text),
-        machine.check_clock(),
-        machine.check_disk(config.recorder),
-        *check_written(config),
-        *machine.check_processor(config.vision.workers),
-        *check_lamp(config),
-        *check_labels(config, site),
-        *check_text(config),
-    ]
+def _configured(subject: Subject) -> Check:
+    height_m = subject.config.mission.height_m
+    text = f"{subject.path}: site {subject.site.name}, {subject.nodes} nodes to visit at {height_m:g} m"
+    return ok("config", text)
 
 
 async def _examine_ardrone(config: Config, clock: Clock) -> tuple[list[Check], camera.Pictures]:

@@ -14,8 +14,9 @@ from flightd.core.errors import InputError, RunError
 from flightd.core.exposure import ExposureState
 from flightd.core.preview import CameraName
 from flightd.core.versions import versions_of
-from flightd.doctor.beside_daemon import Running, check_here, judge_running
+from flightd.doctor.beside_daemon import Running, judge_running
 from flightd.doctor.check import Check, CheckLevel
+from flightd.doctor.computer import check_computer
 from flightd.doctor.exposure import Seen, blur_px
 from flightd.ports import Camera, TellsExposure
 from flightd.runtime.disk_threads import on_disk
@@ -36,10 +37,12 @@ class DroneChecks:
         self._site = site
         self._file = file
         self._log = log
+        self.newest_ns = 0
+        """UTC of the newest look that the inventory had before this flight; 0 without one."""
 
     async def report(self, request_id: str, flight: Flight, outcome: str = "") -> DoctorAnswer:
         """Look at everything: about a second."""
-        here = await on_disk(check_here, self._config, self._site)
+        here = await on_disk(check_computer, self._config, self._site, self.newest_ns)
         found = await self._running(flight)
         checks = [*here, *judge_running(self._config, found)]
         return DoctorAnswer(

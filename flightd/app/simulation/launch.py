@@ -157,6 +157,7 @@ async def _real_time(simulation: Simulation, factor: float, ended_by: list[signa
         process, channel = _started_world(simulation, ports, factor, stack)
         pool = stack.enter_context(detector_pool(config, site, clock))
         count = FlightCount(config, site, simulation.folder, stack, run=identity.run)
+        checks.newest_ns = count.newest_ns
         counting = await count.begun(clock)
         link = ground_link(
             _ground_settings(simulation), site, clock, counting, maintainer, camera_optics(config)

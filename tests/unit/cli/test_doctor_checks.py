@@ -19,7 +19,6 @@ from flightd.adapters.vehicle.mavlink.parameter_rule import judge as judge_param
 from flightd.adapters.vehicle.mavlink.required_parameters import Job, rules_for
 from flightd.adapters.vehicle.range_finders import RangeSample
 from flightd.app.build import pilot_of
-from flightd.app.computer_check import look_here
 from flightd.cli.planned_flight import planned_in_words
 from flightd.config.battery import BatteryConfig
 from flightd.config.camera import CameraConfig
@@ -29,6 +28,7 @@ from flightd.config.vehicle import VehicleConfig
 from flightd.doctor.calibration import check_calibration
 from flightd.doctor.camera import Pictures, check_vision, judge_camera, judge_front_camera
 from flightd.doctor.check import Check, CheckLevel
+from flightd.doctor.computer import check_fitness
 from flightd.doctor.label_text import check_text
 from flightd.doctor.labels import check_labels
 from flightd.doctor.latency import (
@@ -365,7 +365,7 @@ def test_labels_that_are_too_small_to_be_read_are_told_before_the_flight_and_in_
     checks = check_labels(params, site)
     assert [check.text for check in checks] == [says] * bool(says)
     assert set(levels(checks)) <= {CheckLevel.WARNING}, "other states are counted"
-    assert checks == [check for check in look_here(params, site) if check.name == "labels"]
+    assert checks == [check for check in check_fitness(params, site) if check.name == "labels"]
     planned = pilot_of(params, site).mission.planned((), best_order=False)
     words = planned_in_words(planned)
     assert (planned.unread is not None) is bool(says)

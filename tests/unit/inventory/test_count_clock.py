@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from flightd.adapters.store.sqlite import SqliteStore
-from flightd.app.computer_check import ComputerCheck, look_here
+from flightd.app.computer_check import ComputerCheck
 from flightd.app.counting.count import Counting
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.counting.store_writer import StoreWriter
@@ -20,6 +20,7 @@ from flightd.core.inventory import LocationState, Observation, PlannedLocation
 from flightd.core.refusal import words
 from flightd.core.tick import TickOutput
 from flightd.core.types import Demand, Phase
+from flightd.doctor.computer import check_computer, check_fitness
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site
 from tests.rigs.event_loops import real
@@ -48,8 +49,10 @@ def test_a_date_before_the_newest_look_speaks_against_a_flight(
     assert (count.newest_ns, faults.first) == (newest_ns, None)
     behind = ahead_ns > 0
     assert ("set the clock" in caplog.text) is (behind and in_air)
-    unfit = words(ComputerCheck(partial(look_here, CONFIG, SITE, count.newest_ns)).unfit)
+    unfit = words(ComputerCheck(partial(check_fitness, CONFIG, SITE, count.newest_ns)).unfit)
     assert ("set the clock" in unfit) is (ahead_ns > DAY_NS), "what lost an hour is dated after that look"
+    shown = [check.name for check in check_computer(CONFIG, SITE, count.newest_ns)]
+    assert ("inventory clock" in shown) is behind
 
 
 class Dated(StoreWriter):

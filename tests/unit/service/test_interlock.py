@@ -13,11 +13,12 @@ import pytest
 from flightd.adapters.interlock import FileInterlock
 from flightd.app.absent_parts import NO_INTERLOCK
 from flightd.app.build import interlock_of
-from flightd.app.computer_check import ComputerCheck, look_here
+from flightd.app.computer_check import ComputerCheck
 from flightd.config.schema import load_config
 from flightd.core.errors import InputError
 from flightd.core.refusal import RecordedRefusal, words
 from flightd.core.types import CommandKind, Phase
+from flightd.doctor.computer import check_fitness
 from flightd.runtime.clock import LoopClock
 from flightd.site.site_file import load_site, parse_site, site_toml
 from tests.rigs.event_loops import in_real_time
@@ -145,4 +146,4 @@ def test_what_the_check_before_the_flight_finds_keeps_it_on_the_ground_and_is_to
 def test_this_computer_is_looked_at_without_waiting(tmp_path: Path) -> None:
     lost = CONFIG.with_values(recorder={"folder": tmp_path / "file" / "folder"})
     (tmp_path / "file").write_text("no folder")
-    assert "file" in words(ComputerCheck(lambda: look_here(lost, SITE)).unfit)
+    assert "file" in words(ComputerCheck(lambda: check_fitness(lost, SITE)).unfit)
