@@ -12,7 +12,6 @@ are.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from flightd.app.simulation.scenario_sweep import hazard_scenarios
-from flightd.app.simulation.sweep_routes import ROUTES
+from flightd.app.simulation.sweep_routes import digest
 from flightd.guide.pages import FOLDER
 from flightd.sim.scenario.scenario_files import shipped_scenarios
 
@@ -72,7 +71,7 @@ def evidence_of_pairs(flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def _origin(name: str, flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """What the flights of one row are of, as far as they tell.  MixedError where that is not one thing."""
     found: dict[str, Any] = {}
-    for key in _ORIGIN:
+    for key in (*_ORIGIN, "scenario"):
         values = {str(flight.get(key, _NOT_KEPT)) for flight in flights}
         if len(values) > 1:
             raise MixedError(f"{name}: flights of different {key}: {', '.join(sorted(values))}")
@@ -129,7 +128,7 @@ def markdown() -> str:
         cells = [f"`{name}`", _cause(paths[name]), found_by, str(row.action)]
         if shown is None:
             cells += ["not yet", *[""] * 8]
-        elif shown.get("scenario", digest(paths[name])) != digest(paths[name]):
+        elif shown.get("scenario") != digest(paths[name]):
             cells += ["not since its scenario or routes changed", *[""] * 8]
         else:
             cells += [*_cells(shown), *_origin_cells(shown)]
@@ -169,11 +168,6 @@ def _seeds_text(seeds: Sequence[int]) -> str:
     return ", ".join(f"{first} to {last}" if last > first else f"{first}" for first, last in runs)
 
 
-def digest(scenario: Path) -> str:
-    """Of what goes wrong in it and on which routes, by which flights of an older one are told from these."""
-    return hashlib.sha256(scenario.read_bytes() + repr(ROUTES).encode()).hexdigest()[:12]
-
-
 def _cause(scenario: Path) -> str:
     """What goes wrong in a scenario: the sentence at the head of its file."""
     lines = scenario.read_text(encoding="utf-8").splitlines()
@@ -209,9 +203,6 @@ def _document(
 ) -> dict[str, Any]:
     """What the file of the evidence holds."""
     hazards, of_pairs = evidence_of(flights), evidence_of_pairs(pairs)
-    paths = shipped_scenarios()
-    for name, row in hazards.items():
-        row["scenario"] = digest(paths[name])
     if options.add or options.renew:
         told = json.loads(EVIDENCE.read_text(encoding="utf-8"))
         if told["world"] != world:

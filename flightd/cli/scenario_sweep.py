@@ -18,6 +18,7 @@ from flightd.app.simulation.launch import FlightInterruptedError, fly
 from flightd.app.simulation.scenario_sweep import (
     Origin,
     Prepare,
+    Routes,
     as_it_should,
     fly_every_hazard,
     hazard_scenarios,
@@ -43,12 +44,14 @@ def faults_in_words(faults: Iterable[Mapping[str, Any]]) -> str:
     )
 
 
-def sweep(prepare: Prepare, seeds: Sequence[int], log: SweepLog, origin: Origin, *, as_json: bool) -> None:
+def sweep(
+    prepare: Prepare, seeds: Sequence[int], log: SweepLog, origin: Origin, routes: Routes, *, as_json: bool
+) -> None:
     """Fly every hazard with each seed and print how it went, also where a signal ends it: exit code 128 and
     the signal's number.  RunError when one does not end as the table says."""
     asked, rows = len(hazard_scenarios()) * len(seeds), list[SweptRow]()
     announced = _announced(len(log) + 1, asked, shown=not as_json)
-    interrupted = _until_interrupted(fly_every_hazard(prepare, announced, seeds, log, origin), rows)
+    interrupted = _until_interrupted(fly_every_hazard(prepare, announced, seeds, log, origin, routes), rows)
     wrong = [_name(row, seeds) for row in rows if not as_it_should(row)]
     if as_json:
         print(json.dumps({"flights": rows, "wrong": wrong, "interrupted": _signal(interrupted)}, indent=2))

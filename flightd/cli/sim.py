@@ -122,7 +122,7 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
     from flightd.app.simulation.prepare import prepare
     from flightd.app.simulation.scenario_sweep import Origin, hazard_scenarios
     from flightd.app.simulation.sweep_log import SweepLog, asked_of
-    from flightd.app.simulation.sweep_routes import ALONG
+    from flightd.app.simulation.sweep_routes import AS_SET, route_of
     from flightd.cli.scenario_sweep import fly_seeds, sweep
     from flightd.sim.scenario.scenario import Scenario
     from flightd.sim.scenario.scenario_files import load_scenarios
@@ -135,10 +135,14 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
             return prepare(replace(options, seed=seed), conditions, folder, _say, sweep_route=route.setting)
 
         # what cannot be flown at all is refused here
-        first = prepare(options, Scenario(), out, lambda _: None, sweep_route=ALONG.setting)
+        own = any(text.startswith("mission.nodes") for text in options.settings)
+        routes = (lambda *_: AS_SET) if own else route_of
+        for seed in every[:2]:  # one of each route
+            route = routes(seed, Scenario())
+            first = prepare(options, Scenario(), out, lambda _: None, sweep_route=route.setting)
         origin = Origin(options.world, first.config.vehicle.kind, flown_code())
         asked = asked_of(options, len(hazard_scenarios()) * seeds, seeds)
-        sweep(prepared, every, SweepLog(out / "sweep.jsonl", asked, _say), origin, as_json=as_json)
+        sweep(prepared, every, SweepLog(out / "sweep.jsonl", asked, _say), origin, routes, as_json=as_json)
         return
     conditions = load_scenarios(scenario) if scenario else Scenario()
     if seeds == 1:

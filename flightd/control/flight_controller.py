@@ -59,12 +59,13 @@ class Reference:
 @dataclass(frozen=True, slots=True)
 class Conditions:
     """What else control goes by: the acceleration that no told lean explains (grid axes), against which it
-    leans, by how much slower than configured it answers, 1 as configured, and the roll and pitch that are
-    told of a drone that is level."""
+    leans, by how much slower than configured it answers, 1 as configured, the roll and pitch that are told of
+    a drone that is level, and what of that acceleration a leap of the told lean left out."""
 
     unleant_mps2: tuple[float, float] = (0.0, 0.0)
     ease: float = 1.0
     level_rad: tuple[float, float] = (0.0, 0.0)
+    leapt_mps2: tuple[float, float] = (0.0, 0.0)
 
 
 CALM = Conditions()

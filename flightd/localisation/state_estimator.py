@@ -19,6 +19,7 @@ from flightd.localisation.pose_history import PoseHistory
 from flightd.site.site import Site
 from flightd.tracking.attitude_response import AttitudeResponse
 from flightd.tracking.carried_height import CarriedHeight
+from flightd.tracking.carried_lean import LEVEL
 from flightd.tracking.carried_motion import NO_LEAD, Lead
 from flightd.tracking.climb_doubt import ClimbDoubt
 from flightd.tracking.frame_monitor import FrameMonitor
@@ -26,6 +27,7 @@ from flightd.tracking.height_history import HeightHistory
 from flightd.tracking.line_tracker import LineTracker
 from flightd.tracking.standing_tilt import StandingTilt
 from flightd.tracking.stuck_height import StuckHeight
+from flightd.tracking.told_level import ToldLevel
 
 _LATE_GAIN, _MOST_LATE_S = 0.02, 0.15
 """How soon the usual delay of attitudes is believed, and the most of it."""
@@ -39,6 +41,8 @@ _ATTITUDE_LAG_S = 0.2
 """Of an attitude loop of 10 rad/s, for which the gains are."""
 _UNLEANT_S = 0.1
 """Over so long a push is averaged before it is leant against."""
+_LEAPS_ABOVE_M = 0.5
+"""Nearer to the floor a body that touches it turns faster than is told."""
 _MAP_SIGMA_M = 0.02
 """Of a distance between two lines of the map, as it is painted."""
 _SILENT_S = 0.1
@@ -134,7 +138,7 @@ class StateEstimator:
         self._frames_s = 0.0
         self._unleant = (0.0, 0.0)
         self._risen = False
-        self._stood_ns, self._level_rad = 0, (0.0, 0.0)
+        self._level = ToldLevel(self._config.tracking.expert.priors.attitude_s)
         self.armed = armed
 
     @property
@@ -155,14 +159,17 @@ class StateEstimator:
             late_s = max((tick.now_ns - sample.stamp_ns) * 1e-9, 0.0)
             self._telemetry_s += _LATE_GAIN * (min(late_s, _MOST_LATE_S) - self._telemetry_s)
             self._attitude_ns = sample.stamp_ns
-            self.tracker.attitude(sample)
+            leap = self.tracker.attitude(sample, leaps=self._heights.at(tick.now_ns) > _LEAPS_ABOVE_M)
+            if leap != LEVEL:
+                self._level.leaps(sample.stamp_ns, leap)
             self.poses.add_attitude(sample)
-            self.response.told(sample, obeys=obeys)
+            # what leaps answers no setpoint
+            self.response.told(sample, obeys=obeys and leap == LEVEL)
             if stands:
                 self._standing.take(sample)
         if tick.attitudes:
             self._mind_jitter((tick.now_ns - self._attitude_ns) * 1e-9)
-        if stands or not self._stood_ns:  # some are in the air with the first that they tell once armed
+        if stands or not self._level.is_known:  # some are in the air with the first that they tell once armed
             self._mind_standing(tick.now_ns)
         self.tracker.assume(self.response.foreseen(tick.now_ns))
         if v is not None:
@@ -182,16 +189,7 @@ class StateEstimator:
     def _mind_standing(self, now_ns: int) -> None:
         tilt_rad = self._standing.at(now_ns)
         if self.armed and tilt_rad is not None:
-            self._stood_ns = now_ns
-            self._level_rad = self.tracker.stands(tilt_rad) or self._level_rad
-
-    def _level_at(self, now_ns: int) -> tuple[float, float]:
-        """Told roll and pitch of a drone that is level, by what was told while it stood: that error wanders,
-        and fades.  By what the picture makes of it later nobody flies level."""
-        lasts_s = self._config.tracking.expert.priors.attitude_s
-        left = math.exp(-(now_ns - self._stood_ns) * 1e-9 / lasts_s)
-        (roll_rad, pitch_rad), lead = self._level_rad, self.tracker.lead_rad
-        return left * roll_rad - lead.roll_rad, left * pitch_rad - lead.pitch_rad
+            self._level.stood(now_ns, self.tracker.stands(tilt_rad))
 
     def _mind_jitter(self, late_s: float) -> None:
         late_s = min(max(late_s, 0.0), _MOST_JITTER_S)
@@ -285,7 +283,7 @@ class StateEstimator:
         tracker, response = self.tracker, self.response
         seen_ns = tracker.newest_ns
         if not seen_ns:
-            return Conditions(level_rad=self._level_at(now_ns))
+            return Conditions(level_rad=self._level.at(now_ns))
         late_s = min(max((now_ns - seen_ns) * 1e-9, 0.0), _MOST_LATE_S)
         self._frames_s += _LATE_GAIN * (late_s - self._frames_s)
         slower_s = max(2.0 / response.bandwidth_radps - _ATTITUDE_LAG_S, 0.0)
@@ -296,8 +294,8 @@ class StateEstimator:
         now_x, now_y = tracker.unleant(now_ns)
         self._unleant = x, y = x + part * (now_x - x), y + part * (now_y - y)
         ease = min(max(_FREE_S / total_s, _LEAST_EASE), 1.0)
-        leapt_x, leapt_y = tracker.leapt(now_ns)  # what leaps is answered at once
-        return Conditions((x + leapt_x, y + leapt_y), ease, self._level_at(now_ns))
+        leapt = tracker.leapt(now_ns)  # is answered at once
+        return Conditions((x + leapt[0], y + leapt[1]), ease, self._level.at(now_ns), leapt)
 
     def _take_frame(self, lines: LineSet) -> None:
         exposed_ns, carried = self.tracker.exposed_ns(lines), self._carried

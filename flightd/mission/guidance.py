@@ -39,8 +39,9 @@ class Warnings:
     `climb_error_mps` (how much too great it is told), `push_mps2` the acceleration that no lean explains,
     `off_m` the distance from the reference while steering, `swings` that the drone swings about it,
     `headroom_m` the way up to the ceiling's margin, `outside_m` how far outside the corridor, whose
-    nearest line is at `line_m`, `delay_leaps` how often the camera's delay became another one; `tick_s` the
-    mean time between ticks."""
+    nearest line is at `line_m`, `delay_leaps` how often the camera's delay became another one, `lean_leaps`
+    how often roll or pitch was told otherwise while the gyros felt no turn; `tick_s` the mean time between
+    ticks."""
 
     frame_age_s: float = 0.0
     frozen_s: float = 0.0
@@ -58,6 +59,7 @@ class Warnings:
     outside_m: float = 0.0
     line_m: tuple[float, float] = (0.0, 0.0)
     delay_leaps: int = 0
+    lean_leaps: int = 0
     tick_s: float = 0.02
     health: Health = HEALTHY
 

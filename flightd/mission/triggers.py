@@ -75,6 +75,7 @@ class Trigger(enum.Enum):
     DETECTOR_LOST = "a detector process was replaced"
     RECORDER_DEAD = "the log's writer was started again"
     DELAY_LEAPT = "the camera's delay is another one"
+    LEAN_LEAPT = "the told roll and pitch leapt"
     PLAN = "a plan ordered"
     START = "start ordered"
     GOTO = "another node ordered"

@@ -164,9 +164,9 @@ class LineTracker:
         return self._filter.delay_sigma_s
 
     @property
-    def lead_rad(self) -> Lean:
-        """By how much less roll and pitch is told than gyros have carried on over leaps of them."""
-        return self._carried_lean.lead
+    def lean_leaps(self) -> int:
+        """How often roll and pitch were told otherwise while the gyros felt no turn."""
+        return self._carried_lean.leaps
 
     def learnt(self) -> LearntSensors | None:
         """What is known of the sensors, for the tracker after this one; None before a line was seen, and once
@@ -175,34 +175,35 @@ class LineTracker:
 
     def assume(self, samples: Iterable[Attitude]) -> None:
         """Take what is assumed of the attitude from the newest sample on, in the place of what was."""
-        lead_rad, lean_by = self._carried_heading.lead_rad, self.lead_rad
+        lead_rad, lead_at = self._carried_heading.lead_rad, self._carried_lean.lead_at
         self._history.assume(
-            sample.turned_to(wrap_pi(sample.yaw_rad + lead_rad)).leant_by(*lean_by) for sample in samples
+            sample.turned_to(wrap_pi(sample.yaw_rad + lead_rad)).leant_by(*lead_at(sample.stamp_ns))
+            for sample in samples
         )
 
     def measured(self, lines: LineSet) -> bool:
         """Whether the attitude at the frame's exposure has been told."""
         return self.exposed_ns(lines) <= self._history.measured_ns
 
-    def attitude(self, sample: Attitude) -> None:
-        """Take a sample of telemetry."""
+    def attitude(self, sample: Attitude, *, leaps: bool = True) -> Lean:
+        """Take a sample of telemetry; by how much its roll and pitch leapt, where a leap is none of the floor
+        that it touches."""
         carried = self._carried_heading.take(sample, watched=sample.stamp_ns - self._lines_ns < _WATCHED_NS)
         self._as_told.add(sample)
-        self._history.add(self._carried_lean.take(carried))
+        self._history.add(self._carried_lean.take(carried, leaps=leaps))
         self._dispute.told(carried)
         if not self._headed:
             self._headed = True
             offset = wrap_pi(self._start_yaw_rad - carried.yaw_rad)
             self._filter.turn_to(offset, self._params.start_yaw_sigma_rad)
+        return self._carried_lean.leap
 
     def stands(self, told_rad: tuple[float, float]) -> tuple[float, float] | None:
-        """The drone stands in that roll and pitch, as they are told; returns those of a level drone, as they
-        are carried, None once lines have told of the attitude: then it is no measurement of its own any
-        more."""
+        """The drone stands in that roll and pitch, as they are told; returns those of a drone that is level,
+        None once lines have told of the attitude: then it is no measurement of its own any more."""
         if self._lines_ns:
             return None
-        roll_rad, pitch_rad = self.lead_rad
-        self._filter.stand_level((told_rad[0] + roll_rad, told_rad[1] + pitch_rad))
+        self._filter.stand_level(told_rad)
         return -self._filter.mean(ROLL), -self._filter.mean(PITCH)
 
     def exposed_ns(self, lines: LineSet) -> int:
@@ -373,11 +374,12 @@ class LineTracker:
 
     def leapt(self, now_ns: int) -> tuple[float, float]:
         """Acceleration along the grid axes (m/s2) that the told lean leaves out since it leapt."""
-        if not any(self.lead_rad):
+        lead = self._carried_lean.lead_at(now_ns)
+        if not any(lead):
             return 0.0, 0.0
         carried = self._attitude_at(now_ns)
         x, y = self._leant(carried)
-        told_x, told_y = self._leant(carried.leant_by(*(-lead for lead in self.lead_rad)))
+        told_x, told_y = self._leant(carried.leant_by(-lead.roll_rad, -lead.pitch_rad))
         return x - told_x, y - told_y
 
     def _leant(self, lean_of: Attitude) -> tuple[float, float]:

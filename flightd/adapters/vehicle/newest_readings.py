@@ -8,6 +8,7 @@ from typing import Protocol
 
 from flightd.adapters.vehicle.height_leap_gate import HeightLeapGate
 from flightd.adapters.vehicle.range_finders import RangeFinders, RangeSample
+from flightd.core.geometry import angle_rates
 from flightd.core.refusal import Refusal
 from flightd.core.types import Attitude, LandedState, VehicleState
 
@@ -70,6 +71,8 @@ class NewestReadings:
         self._battery_cells = 0
         self._battery_ns = 0
         self._stamps_refused = 0
+        self._time_broke = False
+        """The time between the newest attitude and the one to come is not known."""
         self.heartbeat_ns = 0
         self.armed = False
         self.in_failsafe = False
@@ -83,6 +86,15 @@ class NewestReadings:
     def yaw_rad(self) -> float | None:
         """The newest measured heading."""
         return None if self._attitude is None else self._attitude.yaw_rad
+
+    def _sample(
+        self, stamp_ns: int, angles: tuple[float, float, float], body_radps: tuple[float, float, float]
+    ) -> Attitude:
+        """One attitude; by its rates nobody is to reckon over a time that is not known."""
+        yaw_rate, *leaning = angle_rates(angles[0], angles[1], body_radps)
+        roll_rate, pitch_rate = (math.nan, math.nan) if self._time_broke else leaning
+        self._time_broke = False
+        return Attitude(stamp_ns, *angles, yaw_rate, roll_rate, pitch_rate)
 
     def attitudes(self) -> list[Attitude]:
         """The attitude samples since the last call, oldest first."""

@@ -13,7 +13,7 @@ from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.launch import FlightInterruptedError, fly
 from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.sweep_log import SweepLog, SweptRow
-from flightd.app.simulation.sweep_routes import SweepRoute, route_of
+from flightd.app.simulation.sweep_routes import SweepRoute, digest
 from flightd.core.errors import FlightdError
 from flightd.core.snapshot import Snapshot
 from flightd.core.utc_time import utc_day
@@ -25,6 +25,8 @@ from flightd.sim.scenario.scenario_files import load_scenario, shipped_scenarios
 
 Prepare: TypeAlias = Callable[[Scenario, str, int, SweepRoute], Simulation]
 """Makes the flight of a scenario that is laid on a route, its name, a seed and the route."""
+Routes: TypeAlias = Callable[[int, Scenario], SweepRoute]
+"""The route of a seed and a scenario."""
 Observe: TypeAlias = Callable[[str, Simulation], AbstractContextManager[Callable[[Snapshot], None]]]
 """Gives, for the scenario that is flown now, what looks on."""
 
@@ -51,16 +53,16 @@ def as_it_should(row: Mapping[str, Any]) -> bool:
 
 
 def fly_every_hazard(
-    prepare: Prepare, observe: Observe, seeds: Sequence[int], log: SweepLog, origin: Origin
+    prepare: Prepare, observe: Observe, seeds: Sequence[int], log: SweepLog, origin: Origin, routes: Routes
 ) -> Iterator[SweptRow]:
-    """Fly what `prepare` makes of each hazard's shipped scenarios with each seed, on the seed's route, in the
+    """Fly what `prepare` makes of each hazard's shipped scenarios with each seed, on its route, in the
     table's order; those in `log` are told as they were.  What goes wrong with one is its row's error.
     FlightInterruptedError when a signal ends it all."""
     paths = shipped_scenarios()
     for name, hazard in hazard_scenarios().items():
         shipped = load_scenario(paths[name])
         for seed in seeds:
-            route = route_of(seed, shipped)
+            route = routes(seed, shipped)
             row = log.row(name, seed)
             if row is None:
                 try:
@@ -72,7 +74,7 @@ def fly_every_hazard(
                     row = _row(name, _unjudged(hazard), str(err), shipped.needs_real_time, seed, origin)
                 else:
                     row = _flown(name, hazard, simulation, observe, origin)
-                row |= {"route": route.name}
+                row |= {"route": route.name, "scenario": digest(paths[name])}
                 log.append(row)
             yield row
 

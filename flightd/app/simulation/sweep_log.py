@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 from flightd import __version__
 from flightd.app.simulation.prepare import SimOptions
+from flightd.app.simulation.sweep_routes import ROUTES
 from flightd.core.errors import InputError, cannot_write
 
 SweptRow: TypeAlias = dict[str, Any]
@@ -24,6 +25,7 @@ def asked_of(options: SimOptions, flights: int, seeds: int) -> dict[str, Any]:
     files = [path for path in (options.config, options.warehouse) if path and Path(path).is_file()]
     read = {str(path): hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in files}
     told = asdict(options) | {"seeds": seeds, "flights": flights, "files": read, "flightd": __version__}
+    told |= {"routes": [asdict(route) for route in ROUTES]}
     known: dict[str, Any] = json.loads(json.dumps(told, default=str))
     return known
 

@@ -3,7 +3,9 @@ body 0.9 m on either side, and across to the next one, where the ends of racks l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import hashlib
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final
 
 from flightd.sim.scenario.fault_schema import Fault, WindChange
@@ -44,6 +46,14 @@ ACROSS: Final = SweepRoute("across", ("A1", "B1", "B2"), (0.0, 1.3))
 """A fault begins where the drone comes between the racks' ends, one stop behind it: on a battery that has
 done nothing no other one would follow."""
 ROUTES: Final = (ALONG, ACROSS)
+AS_SET: Final = replace(ALONG, name="as set")
+"""Where another `mission.nodes` is set on top, all seeds fly that."""
+
+
+def digest(scenario: Path) -> str:
+    """Of what goes wrong in a scenario's file and on which routes, by which flights of an older one are told
+    from these."""
+    return hashlib.sha256(scenario.read_bytes() + repr(ROUTES).encode()).hexdigest()[:12]
 
 
 def route_of(seed: int, scenario: Scenario) -> SweepRoute:

@@ -54,7 +54,7 @@ class Steering:
         motion = self._motion(pose, height_m, dt_s, stand_yaw_rad, lead)
         control, reference = self._control, guidance.reference.after(lead.after_s)
         sight_s, ease = min(inputs.x_age_s, inputs.y_age_s), self._plausibility.oscillation.ease
-        rises = guidance.phase is Phase.TAKE_OFF
+        rises, leapt = guidance.phase is Phase.TAKE_OFF, conditions.leapt_mps2
         if guidance.guide is Guide.NONE:
             control.reset()
             return None
@@ -66,7 +66,7 @@ class Steering:
                 motion,
                 reference,
                 dt_s,
-                conditions.unleant_mps2 if rises else push,
+                conditions.unleant_mps2 if rises else (push[0] + leapt[0], push[1] + leapt[1]),
                 dead_reckoned=guidance.dead_reckoned,
                 ease=min(ease, conditions.ease) if rises else ease,
             )

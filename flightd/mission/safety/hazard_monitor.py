@@ -88,7 +88,7 @@ class HazardMonitor:
         self._debounce: defaultdict[Trigger, DebounceTimer] = defaultdict(DebounceTimer)
         self._trouble, self._worse = DebounceTimer(), DebounceTimer()
         self._detectors, self._writers, self._stamps = Counted(), Counted(), Counted(_JUMPED)
-        self._leaps = Counted()
+        self._delay_leaps, self._lean_leaps = Counted(), Counted()
         self._seen = DebounceTimer()
         self.blind = FloorViewMonitor(config)
         self._unseen_ns: int | None = None
@@ -188,7 +188,8 @@ class HazardMonitor:
             Trigger.ATTITUDE_WRONG: (abs(w.heading_error_rad) > h.heading_rad, h.disagree_s),
             Trigger.WIND: (w.push_mps2 > h.expert.push_mps2 or w.off_m > h.expert.off_m, h.expert.push_s),
             Trigger.SWINGS: (w.swings, 0.0),
-            Trigger.DELAY_LEAPT: (self._leaps.step(w.delay_leaps, s.now_ns), 0.0),
+            Trigger.DELAY_LEAPT: (self._delay_leaps.step(w.delay_leaps, s.now_ns), 0.0),
+            Trigger.LEAN_LEAPT: (self._lean_leaps.step(w.lean_leaps, s.now_ns), 0.0),
             Trigger.CEILING_LEFT: (w.headroom_m < 0.0, h.expert.outside_s),
             Trigger.CORRIDOR_LEFT: (w.outside_m > 0.0, h.expert.outside_s),
         }

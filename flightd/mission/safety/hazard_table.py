@@ -351,6 +351,15 @@ HAZARDS: tuple[Hazard, ...] = (
         _FAST,
     ),
     Hazard(
+        "lean_leapt",
+        Trigger.LEAN_LEAPT,
+        "roll or pitch told otherwise by more than a degree from one sample to the next, while the gyros,"
+        " which explained its turns before, felt none",
+        Action.REPORT,
+        "roll and pitch are carried by the gyros, and what the told ones leave out is leaned against at once",
+        _FAST,
+    ),
+    Hazard(
         "detector_killed",
         Trigger.DETECTOR_LOST,
         "the detector's channel closes, in the middle of an answer too",

@@ -105,6 +105,7 @@ class PlausibilityMonitor:
             outside_m=outside_m,
             line_m=line_m,
             delay_leaps=tracker.delay_leaps,
+            lean_leaps=tracker.lean_leaps,
             tick_s=self._tick_s,
             health=health,
         )

@@ -116,6 +116,11 @@ def ring(flight: IdealFlight) -> None:
     flight.airframe.params = replace(whole, attitude_bandwidth_radps=slow_radps, attitude_damping=0.15)
 
 
+def mislead(flight: IdealFlight) -> None:
+    """The autopilot believes another one of its estimators."""
+    flight.sensors.fault.roll_rad, flight.sensors.fault.pitch_rad = math.radians(3.0), math.radians(-3.0)
+
+
 ROWS = {row.name: row for row in HAZARDS}
 TRIALS: dict[str, Trial] = {
     "pilot": Trial(pilot, found_s=0.1),
@@ -152,6 +157,7 @@ TRIALS: dict[str, Trial] = {
     "delay_leapt": Trial(
         fault(delay_ns=-33_000_000), ends=Phase.DONE, found_s=2.0, visits=("A4", "A3", "A1")
     ),
+    "lean_leapt": Trial(mislead, ends=Phase.DONE, found_s=0.05),
     "detector_killed": Trial(fault(health=Health(0.08, 1)), ends=Phase.DONE, found_s=0.05),
     "detector_hung": Trial(fault(health=Health(0.08, 2)), ends=Phase.DONE, found_s=0.05),
     "overload": Trial(fault(health=Health(0.4)), found_s=3.2),

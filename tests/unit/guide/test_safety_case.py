@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
+from flightd.app.simulation.sweep_routes import digest
 from flightd.sim.scenario.scenario_files import shipped_scenarios
 from tools import safety_case
-from tools.safety_case import EVIDENCE, MixedError, digest, evidence_of, evidence_of_pairs, markdown, together
+from tools.safety_case import EVIDENCE, MixedError, evidence_of, evidence_of_pairs, markdown, together
 
 
 def flight(
@@ -74,7 +75,7 @@ def test_flights_of_other_code_or_of_a_seed_told_of_already_are_not_summed() -> 
         together("wind", changed, evidence_of([flight("wind", 0.4, 5.0, seed=2, code="aaa-dirty")])["wind"])
 
 
-def test_evidence_from_before_origins_were_kept_is_shown_and_only_renewed(
+def test_evidence_from_before_origins_were_kept_is_none_and_only_renewed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     figures = {"flights": 9, "good": 9, "min_clearance_m": 0.5, "off_leg_max_m": 0.1,
@@ -82,7 +83,8 @@ def test_evidence_from_before_origins_were_kept_is_shown_and_only_renewed(
     evidence, sweep = tmp_path / "evidence.json", tmp_path / "sweep.json"
     kept = {"flown": "2026-10-01", "world": "usual", "hazards": {"wind": figures, "pilot": figures}}
     evidence.write_text(json.dumps(kept))
-    sweep.write_text(json.dumps({"flights": FIRST}))
+    now = {"scenario": digest(shipped_scenarios()["wind"])}
+    sweep.write_text(json.dumps({"flights": [one | now for one in FIRST]}))
     monkeypatch.setattr(safety_case, "EVIDENCE", evidence)
     with pytest.raises(SystemExit):
         safety_case.main([str(sweep), "--add"])
@@ -91,7 +93,7 @@ def test_evidence_from_before_origins_were_kept_is_shown_and_only_renewed(
     assert safety_case.main([str(sweep), "--renew"]) == 0
     rows = {line.split(" | ")[0]: line for line in safety_case.markdown().splitlines()}
     assert rows["| `wind`"].endswith("| 1 to 2 | 2026-11-02 | px4, aaa |")
-    assert rows["| `pilot`"].endswith("| not kept | not kept | not kept |")
+    assert " | not since its scenario or routes changed | " in rows["| `pilot`"]
 
 
 def test_flights_of_a_scenario_as_it_was_are_no_evidence_of_what_it_is_now(

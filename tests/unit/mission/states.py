@@ -366,6 +366,7 @@ STIMULI: Mapping[Trigger, Stimulus] = {
     Trigger.DETECTOR_LOST: sick(detectors_replaced=5),
     Trigger.RECORDER_DEAD: sick(recorder_restarts=5),
     Trigger.DELAY_LEAPT: warned(delay_leaps=1),
+    Trigger.LEAN_LEAPT: warned(lean_leaps=1),
     Trigger.START: Stimulus(_start, 0.04, hold=False),
     Trigger.PLAN: Stimulus(
         lambda flight: flight.order(CommandKind.PLAN, nodes=("A3", "A2")), 0.04, hold=False

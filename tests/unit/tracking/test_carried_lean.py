@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
 
 import pytest
 
 from flightd.core.types import Attitude
-from flightd.tracking.carried_lean import GAP_S, CarriedLean
+from flightd.tracking.carried_lean import GAP_S, LEVEL, CarriedLean
 
 PERIOD_S = 0.02
 FADE_S = 8.0
@@ -24,11 +25,13 @@ def leaning(at_s: float) -> tuple[float, float]:
 def carried(
     error: Callable[[float], float],
     felt: Callable[[float, float], float] = lambda _, rate: rate,
+    late: Callable[[float], float] = lambda _: 0.0,
     *,
     until_s: float = 3.0,
     lost: Callable[[float], bool] = lambda _: False,
 ) -> tuple[CarriedLean, list[tuple[float, float]]]:
-    """How far the carried roll is from the true one, by time, where the told one errs so."""
+    """How far the carried roll is from the true one, by time, where the told one errs so, the gyros feel so
+    much of a rate, and stamps are so late."""
     lean, found = CarriedLean(FADE_S), []
     for sample in range(round(until_s / PERIOD_S) + 1):
         at_s = sample * PERIOD_S
@@ -38,7 +41,11 @@ def carried(
         told = true_rad + error(at_s)
         rates = {"roll_rate_radps": felt(at_s, rate), "pitch_rate_radps": 0.0}
         found.append(
-            (at_s, lean.take(Attitude(round(at_s * 1e9), told, 0.0, 0.0, **rates)).roll_rad - true_rad)
+            (
+                at_s,
+                lean.take(Attitude(round((at_s + late(at_s)) * 1e9), told, 0.0, 0.0, **rates)).roll_rad
+                - true_rad,
+            )
         )
     return lean, found
 
@@ -50,41 +57,99 @@ def leaps(at_s: float) -> float:
 def test_gyros_carry_the_lean_over_a_leap_of_the_told_one() -> None:
     lean, found = carried(leaps, until_s=LEAP_S + 0.2)
     assert max(abs(error) for _, error in found) < math.radians(0.2)
-    assert lean.lead.roll_rad == pytest.approx(-LEAP_RAD, rel=0.1)
-    assert lean.lead.pitch_rad == 0.0
+    lead = lean.lead_at(round((LEAP_S + 0.2) * 1e9))
+    assert lead.roll_rad == pytest.approx(-LEAP_RAD, rel=0.1)
+    assert lead.pitch_rad == 0.0
+    assert lean.leaps == 1
 
 
 def test_a_leap_fades_as_the_error_that_it_brought_does() -> None:
     lean, found = carried(lambda at_s: leaps(at_s) * math.exp((LEAP_S - at_s) / FADE_S), until_s=20.0)
     assert max(abs(error) for _, error in found) < math.radians(0.2)
-    assert lean.lead.roll_rad == pytest.approx(-LEAP_RAD * math.exp((LEAP_S - 20.0) / FADE_S), rel=0.1)
+    for at_s in (20.0, 29.0):  # nothing is heard any more after 20 s
+        left_rad = -LEAP_RAD * math.exp((LEAP_S - at_s) / FADE_S)
+        assert lean.lead_at(round(at_s * 1e9)).roll_rad == pytest.approx(left_rad, rel=0.1)
 
 
 def test_what_leaps_back_leaves_nothing() -> None:
     lean, _ = carried(lambda at_s: leaps(at_s) if at_s < LEAP_S + 0.1 else 0.0, until_s=LEAP_S + 0.2)
-    assert abs(lean.lead.roll_rad) < math.radians(0.1)
+    assert abs(lean.lead_at(0).roll_rad) < math.radians(0.1)
+    assert lean.leaps == 2
 
 
 def test_true_turns_and_errors_that_wander_are_no_leaps() -> None:
     lean, _ = carried(lambda at_s: math.radians(4.0) * math.sin(at_s), until_s=10.0)
-    assert lean.lead == (0.0, 0.0)
+    assert lean.lead_at(0) == LEVEL
 
 
 @pytest.mark.parametrize("rate_radps", [math.nan, 0.0, 0.02, 50.0, math.inf])
 def test_where_no_rate_is_measured_the_lean_is_the_told_one(rate_radps: float) -> None:
     lean, found = carried(leaps, lambda _at_s, _rate: rate_radps)
-    assert lean.lead == (0.0, 0.0)
+    assert lean.lead_at(0) == LEVEL
     assert found[-1][1] == pytest.approx(LEAP_RAD)
 
 
 def test_over_a_gap_nothing_leaps() -> None:
     """A drone may have leant and come back meanwhile."""
     lean, _ = carried(leaps, lost=lambda at_s: LEAP_S - GAP_S < at_s < LEAP_S)
-    assert lean.lead == (0.0, 0.0)
+    assert lean.lead_at(0) == LEVEL
 
 
 def test_a_sample_that_was_overtaken_changes_nothing() -> None:
     lean, _ = carried(leaps, until_s=LEAP_S + 0.1)
-    lead = lean.lead
+    lead = lean.lead_at(0)
     assert lean.take(Attitude(round(LEAP_S * 1e9), 0.0, 0.0, 0.0)).roll_rad == pytest.approx(lead.roll_rad)
-    assert lean.lead == lead
+    assert lean.lead_at(0) == lead
+
+
+def rough(seed: int, rms: float) -> Callable[[float], float]:
+    noise = random.Random(seed)
+    return lambda _: noise.gauss(0.0, rms)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "wrong",
+    [lambda _, rate: -rate, lambda _, rate: math.degrees(rate), lambda _, rate: 0.02 * rate],
+    ids=["the other way", "degrees", "dead"],
+)
+def test_gyros_that_do_not_explain_the_turns_carry_nothing(
+    wrong: Callable[[float, float], float], seed: int
+) -> None:
+    noise = rough(seed, 0.01)
+    lean, _ = carried(leaps, lambda at_s, rate: wrong(at_s, rate) + noise(at_s), until_s=20.0)
+    assert lean.leaps == 0
+
+
+@pytest.mark.parametrize("rms_degps", [15.0, 30.0, 50.0])
+def test_gyros_that_shake_carry_nothing_astray(rms_degps: float) -> None:
+    noise = rough(1, math.radians(rms_degps))
+    _, found = carried(lambda _: 0.0, lambda at_s, rate: rate + noise(at_s), until_s=20.0)
+    assert max(abs(error) for _, error in found) < math.radians(1.5)
+
+
+def test_a_gyro_that_dies_in_flight_carries_nothing_for_long() -> None:
+    lean, found = carried(lambda _: 0.0, lambda at_s, rate: rate if at_s < 10.0 else 0.0, until_s=20.0)
+    wrong_s = [at_s for at_s, error in found if abs(error) > math.radians(1.0)]
+    assert len(wrong_s) * PERIOD_S < 1.0
+    assert abs(found[-1][1]) < math.radians(0.1)
+    assert lean.leaps < 5
+
+
+@pytest.mark.parametrize("late_s", [0.005, 0.01])
+def test_stamps_that_are_wrong_make_no_leaps_of_turns(late_s: float) -> None:
+    noise = random.Random(1)
+    _, found = carried(
+        lambda _: 0.0, late=lambda _: min(noise.expovariate(1.0 / late_s), 0.019), until_s=20.0
+    )
+    assert max(abs(error) for _, error in found) < math.radians(2.0)
+
+
+def test_of_what_touches_the_floor_nothing_leaps() -> None:
+    lean = CarriedLean(FADE_S)
+    for sample in range(200):
+        at_s = sample * PERIOD_S
+        roll_rad, rate = leaning(at_s)
+        told = Attitude(round(at_s * 1e9), roll_rad + leaps(at_s), 0.0, 0.0, 0.0, rate, 0.0)
+        assert lean.take(told, leaps=False) == told
+    assert lean.leaps == 0

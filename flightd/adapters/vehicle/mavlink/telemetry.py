@@ -13,9 +13,8 @@ from flightd.adapters.vehicle.mavlink.link.codec import Message
 from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.newest_readings import REBOOT_MS, NewestReadings, has_rebooted
 from flightd.adapters.vehicle.range_finders import RangeSample
-from flightd.core.geometry import angle_rates
 from flightd.core.refusal import Refusal
-from flightd.core.types import Attitude, LandedState, VehicleState
+from flightd.core.types import LandedState, VehicleState
 
 _HEIGHTS_MAX = 64
 _NS_PER_MS = 1_000_000
@@ -140,7 +139,7 @@ class MavlinkTelemetry(NewestReadings):
         if rebooted:
             self._sync.reset()
         boot_ns = self._boot_ns(boot_ms, now_ns)
-        senseless = self._is_senseless(boot_ns, now_ns)
+        senseless, in_order = self._is_senseless(boot_ns, now_ns), boot_ms > self._boot_ms
         if not senseless:  # one that strayed ahead would make the next good one look like a reboot
             self._boot_ms = boot_ms
             if boot_ms:
@@ -148,10 +147,11 @@ class MavlinkTelemetry(NewestReadings):
         stamp_ns = self._stamp(boot_ns, now_ns)
         self._stamps_refused += rebooted or senseless
         last_ns = stamp_ns - 1 if self._attitude is None or rebooted else self._attitude.stamp_ns
+        if rebooted or senseless or (in_order and stamp_ns <= last_ns):
+            self._time_broke = True
         if stamp_ns >= last_ns:
             body_radps = message.rollspeed, message.pitchspeed, message.yawspeed
-            rates = angle_rates(message.roll, message.pitch, body_radps)
-            self._attitude = sample = Attitude(stamp_ns, *angles, *rates)
+            self._attitude = sample = self._sample(stamp_ns, angles, body_radps)
             if stamp_ns > last_ns:
                 self._attitudes.append(sample)
         return rebooted

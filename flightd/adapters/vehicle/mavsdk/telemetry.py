@@ -14,9 +14,8 @@ from flightd.adapters.vehicle.mavlink.services.clock_offset import ClockSync
 from flightd.adapters.vehicle.mavlink.telemetry import cells_of, range_sample
 from flightd.adapters.vehicle.mavsdk.library import real_fields, whole_fields
 from flightd.adapters.vehicle.newest_readings import REBOOT_MS, NewestReadings, has_rebooted
-from flightd.core.geometry import angle_rates
 from flightd.core.refusal import Refusal
-from flightd.core.types import Attitude, LandedState, VehicleState
+from flightd.core.types import LandedState, VehicleState
 
 _CLIMB_STALE_NS = 500_000_000
 _ATTITUDE_FIELDS = ("time_boot_ms", "roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
@@ -76,12 +75,13 @@ class MavsdkTelemetry(NewestReadings):
         in_order = rebooted or wrapped or boot_ms > self._boot_ms
         if not senseless:  # one that strayed ahead would make the next good one look like a reboot
             self._boot_ms = boot_ms
-        if self._attitude is not None and not rebooted:
-            in_order = in_order and stamp_ns > self._attitude.stamp_ns
+        advances = self._attitude is None or rebooted or stamp_ns > self._attitude.stamp_ns
+        if rebooted or senseless or (in_order and not advances):
+            self._time_broke = True
+        in_order = in_order and advances
         if in_order:
             about_x, about_y, about_z = body_radps
-            rates = angle_rates(roll, pitch, (about_x, about_y, about_z))
-            self._attitude = Attitude(stamp_ns, roll, pitch, yaw, *rates)
+            self._attitude = self._sample(stamp_ns, (roll, pitch, yaw), (about_x, about_y, about_z))
             self._attitudes.append(self._attitude)
 
     def take_range(self, document: str, now_ns: int) -> None:

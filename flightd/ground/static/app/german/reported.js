@@ -209,6 +209,7 @@ export default {
   "battery low": "Akku schwach",
   "a detector process was replaced": "ein Erkennungsprozess wurde ersetzt",
   "the camera's delay is another one": "die Verzögerung der Kamera ist eine andere",
+  "the told roll and pitch leapt": "gemeldetes Rollen und Nicken sprangen",
   "the log's writer was started again": "die Aufzeichnung wurde neu gestartet",
   "a plan ordered": "Plan befohlen",
   "start ordered": "Start befohlen",
