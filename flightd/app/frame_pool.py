@@ -155,6 +155,13 @@ class FramePool(Generic[AskT, FoundT]):
         found: FoundT = answer[0]
         return found
 
+    def tell(self, ticket: FrameTicket, ask: AskT) -> None:
+        """Let the worker that will be asked about a frame have this first, with no answer.  Of several nobody
+        knows which that is: then nothing is told."""
+        if self._size == 1:
+            for worker in self._workers:
+                worker.tell((ticket, ask))
+
     def _lose(self, why: str) -> None:
         """Count a lost frame by why: many reasons name it, so that each would be one of its own."""
         kind = _NUMBER.sub("N", why)

@@ -160,10 +160,14 @@ class Child:
         at a time."""
         self._answer = answer = self._loop.create_future()
         if self.alive:
-            self._process.send(request)
+            self._process.send((request, True))
         else:
             answer.set_exception(TransientError("the process died"))
         return answer
+
+    def tell(self, request: Any) -> None:
+        """Hand over what is answered to nobody; the child comes to it in its turn."""
+        self._process.send((request, False))
 
     def kill(self, why: str = "the process was killed") -> None:
         """End the child at once, which its answer fails with; idempotent."""
@@ -191,4 +195,7 @@ def _answer_requests(parent: ChildEnd, make: Callable[[], Callable[[Any], Any]])
     answer = make()
     parent.send(_READY)
     while True:
-        parent.send(answer(parent.receive()))
+        request, is_asked = parent.receive()
+        answered = answer(request)
+        if is_asked:
+            parent.send(answered)

@@ -19,6 +19,7 @@ from flightd.core.topics import Document, Topic
 from flightd.core.types import Image
 from flightd.ports import Clock, Recorder
 from flightd.runtime.clock import Hold
+from flightd.runtime.frame_ring import FrameTicket
 from flightd.sim.appearance import DEFAULT, Appearance
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.copter import ArduCopterPeer
@@ -131,10 +132,11 @@ class World:
         recorder: Recorder,
         tell: FaultListener = lambda _index, _begins: None,
         hold: Hold = nullcontext,
+        drawn: Callable[[FrameTicket], None] = lambda _: None,
     ) -> None:
-        """`tell` hears of the faults that are not the world's own; time is held by `hold` while pictures are
-        being drawn.  InputError for a fault at an unknown node, UnavailableError without a video library that
-        is needed."""
+        """`tell` hears of the faults that are not the world's own, `drawn` of the down camera's pictures
+        unless they are streamed; time is held by `hold` while pictures are being drawn.  InputError for a
+        fault at an unknown node, UnavailableError without a video library that is needed."""
         self._clock = clock
         self._recorder = recorder
         self._opened = ExitStack()
@@ -170,7 +172,7 @@ class World:
             show = _streaming(spec, recorder, self._opened)
         serves = spec.pads != PadService() and not spec.truth_url
         self._charge_pads = ChargePads(spec.site, airframe, spec.pads) if serves else None
-        self._cameras = {"camera": _down_camera(spec, self._damage, self.vehicle, clock, show, hold)}
+        self._cameras = {"camera": _down_camera(spec, self._damage, self.vehicle, clock, show, hold, drawn)}
         if own_front is not None:
             self._cameras["ardrone-front-camera"] = own_front
         if spec.front is not None:
@@ -262,6 +264,7 @@ def _down_camera(
     clock: Clock,
     show: Callable[[Image, int], None] | None,
     hold: Hold,
+    drawn: Callable[[FrameTicket], None],
 ) -> CameraPeer:
     damage = replace(damage, gaps=damage.gaps + bare_boxes(spec.faults, spec.site))
     camera = spec.unknowns.camera(spec.camera)
@@ -282,6 +285,7 @@ def _down_camera(
         show,
         hold=hold,
         leap=leap,
+        drawn=drawn,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import cv2
@@ -37,6 +38,18 @@ _SPECKS = np.ones((5, 5), np.uint8)
 _HOLES = np.ones((9, 9), np.uint8)
 _WORN = 1.02
 """Closing that adds more than this to the paint shows worn paint, whose holes would break the ridge."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What one picture shows by itself: its lines, without their stamp and what was followed; and `small`, in
+    which that is done.  `marks` are the stages and the times at which they ended."""
+
+    lines: LineSet
+    small: Image
+    grid: Grid
+    plane: Plane
+    marks: tuple[tuple[str, int], ...]
 
 
 class Detector:
@@ -76,6 +89,10 @@ class Detector:
 
         Raises InputError for any other shape or type, and for pictures too small to hold a line.
         """
+        return self.told(self.look(bgr), seq, stamp_ns)
+
+    def look(self, bgr: Image) -> Look:
+        """What the picture shows, whatever was before it.  InputError as for `detect`."""
         _check(bgr)
         marks = [("start", self._now_ns())]
 
@@ -97,21 +114,26 @@ class Detector:
         mark("junctions")
         mats: tuple[PadSight, ...] = ()
         picture = UNCHECKED
-        followed: tuple[FloorFeature, ...] = ()
         if self._features is not None:
             coarse, coarse_grid = coarsened(small, grid)
             mats, picture = pads.find(coarse, lines, coarse_grid, plane), check_picture(coarse)
             mark("pads")
-            followed = self._features.find(small, grid, seq, stamp_ns, plane)
-            mark("features")
         signs: tuple[MarkerSight, ...] = ()
         if self._markers is not None:
             signs = self._markers.find(small, grid, plane)
             mark("markers")
-        timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(marks)}
-        return LineSet(
-            seq, stamp_ns, width, height, lines, found, self.method, timings, mats, picture, signs, followed
-        )
+        seen = LineSet(0, 0, width, height, lines, found, self.method, {}, mats, picture, signs)
+        return Look(seen, small, grid, plane, tuple(marks))
+
+    def told(self, look: Look, seq: int = 0, stamp_ns: int = 0) -> LineSet:
+        """The lines and junctions of a picture, of which `look` tells, and the features followed to it."""
+        timings = {name: (end - begin) / 1e6 for (_, begin), (name, end) in pairwise(look.marks)}
+        followed: tuple[FloorFeature, ...] = ()
+        if self._features is not None:
+            began_ns = self._now_ns()
+            followed = self._features.find(look.small, look.grid, seq, stamp_ns, look.plane)
+            timings["features"] = (self._now_ns() - began_ns) / 1e6
+        return replace(look.lines, frame_seq=seq, stamp_ns=stamp_ns, timings_ms=timings, features=followed)
 
     def _plane(self, width: int, height: int) -> Plane:
         lens = self._lens

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
+from enum import Enum, auto
 from functools import partial
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import cv2
 
@@ -18,11 +20,33 @@ from flightd.runtime.frame_ring import FrameTicket
 
 _Lines: TypeAlias = "tuple[LineSet, bytes | None]"
 
+_MOST_AHEAD = 8
+"""Frames looked at ahead and not asked for yet: more than are on their way from any camera."""
+
 
 class Detect(Protocol):
     """What finds lines: pixels in, lines out."""
 
     def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet: ...
+
+
+@runtime_checkable
+class LooksAhead(Protocol):
+    """What is able to do the part of it that the pixels alone decide before the frame is asked for:
+    `detect` is `told` of what `look` says."""
+
+    def look(self, bgr: Image) -> Any: ...
+
+    def told(self, look: Any, seq: int = 0, stamp_ns: int = 0) -> LineSet: ...
+
+
+class Wanted(Enum):
+    """What a detector process is to make of a frame."""
+
+    AHEAD = auto()
+    """Nothing yet, but it will be asked for its lines."""
+    LINES = auto()
+    LINES_AND_JPEG = auto()
 
 
 class Detectors(Protocol):
@@ -52,13 +76,29 @@ class _DetectLines:
 
     def __init__(self, make: Callable[[], Detect]) -> None:
         self._detector = make()
+        self._ahead: OrderedDict[tuple[str, int], Any] = OrderedDict()
 
-    def __call__(self, bgr: Image, ticket: FrameTicket, ask: bool) -> _Lines:
-        lines = self._detector.detect(bgr, ticket.seq, ticket.stamp_ns)
-        return lines, cv2.imencode(".jpg", bgr)[1].tobytes() if ask else None
+    def __call__(self, bgr: Image, ticket: FrameTicket, wanted: Wanted) -> _Lines | None:
+        if wanted is Wanted.AHEAD:
+            self._look_ahead(bgr, ticket)
+            return None
+        jpeg = cv2.imencode(".jpg", bgr)[1].tobytes() if wanted is Wanted.LINES_AND_JPEG else None
+        return self._lines(bgr, ticket), jpeg
+
+    def _look_ahead(self, bgr: Image, ticket: FrameTicket) -> None:
+        if isinstance(self._detector, LooksAhead):
+            self._ahead[ticket.ring, ticket.seq] = self._detector.look(bgr)
+            if len(self._ahead) > _MOST_AHEAD:
+                self._ahead.popitem(last=False)
+
+    def _lines(self, bgr: Image, ticket: FrameTicket) -> LineSet:
+        look = self._ahead.pop((ticket.ring, ticket.seq), None)
+        if look is not None and isinstance(self._detector, LooksAhead):
+            return self._detector.told(look, ticket.seq, ticket.stamp_ns)
+        return self._detector.detect(bgr, ticket.seq, ticket.stamp_ns)
 
 
-class DetectorPool(FramePool[bool, _Lines]):
+class DetectorPool(FramePool[Wanted, "_Lines | None"]):
     """Processes that find the lines; `make` builds the detector inside each and must be picklable."""
 
     def __init__(
@@ -74,7 +114,12 @@ class DetectorPool(FramePool[bool, _Lines]):
     async def detect(self, ticket: FrameTicket, with_jpeg: bool = False) -> Detection | None:
         """Lines of one frame (and its JPEG if wanted), or None when it was lost."""
         started_ns = self._clock.now_ns()
-        found = await self.ask(ticket, with_jpeg)
+        found = await self.ask(ticket, Wanted.LINES_AND_JPEG if with_jpeg else Wanted.LINES)
         if found is None:
             return None
         return Detection(ticket, found[0], started_ns, self._clock.now_ns(), found[1])
+
+    def look_ahead(self, ticket: FrameTicket) -> None:
+        """Begin with a frame whose pixels are there before it arrives: in a simulation it is under way for
+        longer than it takes to look at.  `detect` finds the same with and without."""
+        self.tell(ticket, Wanted.AHEAD)

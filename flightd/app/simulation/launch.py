@@ -24,6 +24,7 @@ from flightd.app.absent_parts import NO_GROUND
 from flightd.app.build import build, detector_pool, ground_link
 from flightd.app.counting.flight_count import FlightCount
 from flightd.app.daemon import Daemon, FlightResult
+from flightd.app.detection.detector_pool import DetectorPool
 from flightd.app.flight import Flight
 from flightd.app.flight_identity import FlightIdentity
 from flightd.app.maintenance.checks import DroneChecks
@@ -101,7 +102,7 @@ async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Si
         truth = stack.enter_context(McapRecorder(simulation.truth_log, when_full=wait_for_disk))
         pool = stack.enter_context(detector_pool(config, site, clock, hold))
         faults = LauncherFaults(simulation.scenario.fault, pool, recorder)
-        world, ports = await _opened(simulation, clock, hold, truth, faults)
+        world, ports = await _opened(simulation, clock, hold, truth, faults, pool)
         count = FlightCount(config, site, simulation.folder, stack, run=identity.run)
         counting = await count.begun(clock, lambda readers: LockstepReaders(readers, READING_S, hold), hold)
         await pool.ready()
@@ -123,13 +124,19 @@ async def _lockstep(simulation: Simulation, hold: Hold, ended_by: list[signal.Si
 
 
 async def _opened(
-    simulation: Simulation, clock: LoopClock, hold: Hold, truth: McapRecorder, faults: LauncherFaults
+    simulation: Simulation,
+    clock: LoopClock,
+    hold: Hold,
+    truth: McapRecorder,
+    faults: LauncherFaults,
+    pool: DetectorPool,
 ) -> tuple[World, WorldPorts]:
-    """A world that listens, and its ports.  A port that was free a moment ago may have been taken by
-    another simulation: then others are tried."""
+    """A world that listens, and its ports; what its down camera draws the `pool` looks at ahead.
+
+    A port that was free a moment ago may have been taken by another simulation: then others are tried."""
     for attempt in range(1, _PORT_TRIES + 1):
         ports = free_ports(simulation.config)
-        world = World(world_spec(simulation, ports), clock, truth, faults.tell, hold)
+        world = World(world_spec(simulation, ports), clock, truth, faults.tell, hold, pool.look_ahead)
         try:
             await world.open()
         except UnavailableError:

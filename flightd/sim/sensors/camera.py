@@ -26,7 +26,7 @@ from flightd.ports import Clock
 from flightd.runtime.child_process import Child
 from flightd.runtime.clock import Hold
 from flightd.runtime.frame_notice import FrameNotice, decode_request, encode_notice
-from flightd.runtime.frame_ring import FrameRing
+from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from flightd.sim.leap import NEVER, Leap
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import USUALLY, Taking
@@ -126,7 +126,8 @@ class CameraPeer:
 
     `make` is called in the rendering process (it must be picklable); `seed` draws the delivery's jitter.
     While `wanted` says no, no picture is taken; `lamp` is that of `PictureMaker`; after the `leap` all
-    pictures come later.  Time is held by `hold` while one is being drawn.  A renderer that fails ends it with
+    pictures come later.  `drawn` hears of each picture that lies in memory, by this clock, long before its
+    notice is sent.  Time is held by `hold` while one is being drawn.  A renderer that fails ends it with
     a RunError that has the camera's `name`: a flight that goes on blind for a fault of its world tells
     nothing."""
 
@@ -144,8 +145,9 @@ class CameraPeer:
         name: str = "camera",
         lamp: Callable[[], float] = float,
         leap: Leap = NEVER,
+        drawn: Callable[[FrameTicket], None] = lambda _: None,
     ) -> None:
-        self._name, self._leap = name, leap
+        self._name, self._leap, self._drawn = name, leap, drawn
         self._lamp = lamp
         self._wanted = wanted
         self._hold = hold
@@ -263,7 +265,14 @@ class CameraPeer:
             self._spoil(self._ring.pixels(slot))
             self._newest = slot
             self._ring.publish(slot, seq, truth.stamp_ns)
+            if self._show is None:
+                self._drawn(self._ticket(slot, seq, truth.stamp_ns, how))
             return slot
+
+    def _ticket(self, slot: int, seq: int, stamp_ns: int, how: Taking) -> FrameTicket:
+        ring, lens, now_ns = self._ring, self._camera.lens, self._clock.now_ns()
+        size = lens.width_px, lens.height_px
+        return FrameTicket(ring.name, slot, ring.slots, seq, stamp_ns, now_ns, *size, how.exposure, how.gain)
 
     def _spoil(self, picture: Image) -> None:
         """What is wrong with the camera shows."""

@@ -38,6 +38,16 @@ class MeanDetector:
         return LineSet(seq, stamp_ns, bgr.shape[1], bgr.shape[0], (), (), str(int(bgr.mean())))
 
 
+class FarSighted(MeanDetector):
+    """Answers whether the frame was looked at ahead, and its mean then."""
+
+    def look(self, bgr: Image) -> str:
+        return f"ahead {int(bgr.mean())}"
+
+    def told(self, look: str, seq: int = 0, stamp_ns: int = 0) -> LineSet:
+        return LineSet(seq, stamp_ns, 64, 36, (), (), look)
+
+
 LARGE_BYTES = 8 << 20
 
 
@@ -171,6 +181,65 @@ def test_the_ring_refuses_foreign_names_and_slots() -> None:
         assert np.all(ring.pixels(0) == 0)
     finally:
         ring.close()
+
+
+def methods(found: list[Detection | None]) -> list[str | None]:
+    return [None if detection is None else detection.lines.method for detection in found]
+
+
+def test_a_frame_is_looked_at_before_it_is_asked_for_and_once() -> None:
+    """Also one that is asked for after a later one, and never one of another camera."""
+
+    async def main() -> list[str | None]:
+        ring, other = FrameRing.create(4, 64, 36), FrameRing.create(4, 64, 36)
+        try:
+            with DetectorPool(partial(FarSighted), 1, 1.0, LoopClock()) as pool:
+                await pool.ready()
+                frames = [ticket(ring, seq, 10 * seq) for seq in (1, 2)]
+                for frame in frames:
+                    pool.look_ahead(replace(frame, stamp_ns=0))
+                asked = [frames[1], ticket(other, 1, 50), frames[0], frames[0]]
+                return methods([await pool.detect(frame) for frame in asked])
+        finally:
+            ring.close()
+            other.close()
+
+    assert real(main()) == ["ahead 20", "50", "ahead 10", "10"]
+
+
+def test_of_frames_looked_at_ahead_and_never_asked_for_the_oldest_are_forgotten() -> None:
+    async def main() -> list[str | None]:
+        ring = FrameRing.create(16, 64, 36)
+        try:
+            with DetectorPool(partial(FarSighted), 1, 1.0, LoopClock()) as pool:
+                await pool.ready()
+                frames = [ticket(ring, 20 + n, n) for n in range(12)]
+                for frame in frames:
+                    pool.look_ahead(frame)
+                return methods([await pool.detect(frame) for frame in (frames[0], frames[-1])])
+        finally:
+            ring.close()
+
+    assert real(main()) == ["0", "ahead 11"]
+
+
+def test_a_frame_overwritten_since_it_was_looked_at_ahead_is_lost() -> None:
+    async def main() -> Detection | None:
+        ring = FrameRing.create(2, 64, 36)
+        try:
+            with DetectorPool(partial(FarSighted), 1, 1.0, LoopClock()) as pool:
+                await pool.ready()
+                old = ticket(ring, 1, 50)
+                pool.look_ahead(old)
+                assert await pool.detect(old) is not None
+                pool.look_ahead(old)
+                await asyncio.sleep(0.1)
+                ticket(ring, 3, 99)
+                return await pool.detect(old)
+        finally:
+            ring.close()
+
+    assert real(main()) is None
 
 
 def test_in_lockstep_a_detector_that_hangs_costs_one_picture() -> None:

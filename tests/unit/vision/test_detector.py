@@ -334,3 +334,16 @@ def test_the_stages_are_timed_when_a_clock_is_given() -> None:
     seen = detector.detect(draw([Band(0.0, 0.5, 20.0)]))
     stages = ("colour", "guess", "refine", "junctions", "pads", "features")
     assert seen.timings_ms == dict.fromkeys(stages, 1.0)
+
+
+def test_frames_looked_at_ahead_are_told_as_those_that_are_detected_in_turn() -> None:
+    """What is followed from frame to frame goes by the order in which they are told."""
+    rng = np.random.default_rng(3)
+    floor = cv2.GaussianBlur(rng.integers(40, 200, (420, 760, 3), dtype=np.uint8), (0, 0), 3.0)
+    frames = [np.array(floor[4 * n : 4 * n + 360, 6 * n : 6 * n + 640], np.uint8) for n in range(3)]
+    stamps_ns = [(n + 1) * 33_000_000 for n in range(3)]
+    in_turn, ahead = Detector(in_flight=True), Detector(in_flight=True)
+    detected = [in_turn.detect(frame, n, stamps_ns[n]) for n, frame in enumerate(frames)]
+    looks = [ahead.look(frame) for frame in frames]
+    assert [ahead.told(look, n, stamps_ns[n]) for n, look in enumerate(looks)] == detected
+    assert detected[-1].features
