@@ -234,7 +234,8 @@ class StateEstimator:
         if pose is not None:
             self.poses.add(pose)
             for axis in (0, 1):
-                self.tracker.survey(axis, self.localiser.map_lines(axis), _MAP_SIGMA_M)
+                if self.tracker.to_survey(axis):
+                    self.tracker.survey(axis, self.localiser.map_lines(axis), _MAP_SIGMA_M)
         if tracks is not None and pose is not None:
             self.pads.step(tracks, pose)
         by_pad = None if pose is None else self.pads.over(pose, self.localiser.ever_matched)

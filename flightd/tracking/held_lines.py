@@ -149,6 +149,12 @@ def refound(
     return pairs
 
 
+def awaits_survey(held: Sequence[HeldLine], axis: int) -> bool:
+    """Whether `unsurveyed` may find any lines across an axis, whatever the map has of them."""
+    sure = [one for one in held if one.axis == axis and one.feature is None and one.is_sure]
+    return len(sure) > 1 and not all(one.surveyed for one in sure)
+
+
 def unsurveyed(
     held: Sequence[HeldLine], axis: int, ids: Container[int], sigma: Callable[[int], float]
 ) -> Iterator[tuple[int, int]]:

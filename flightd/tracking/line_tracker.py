@@ -29,6 +29,7 @@ from flightd.tracking.ground_squares import placed_squares
 from flightd.tracking.gyro_judge import GyroJudge
 from flightd.tracking.heading_dispute import HeadingDispute, Turned
 from flightd.tracking.heading_vote import heading_vote
+from flightd.tracking.held_lines import awaits_survey
 from flightd.tracking.line_sight import (
     FeatureSight,
     as_compensated,
@@ -343,9 +344,12 @@ class LineTracker:
             velocity_sigma_mps=(sigma_x, sigma_y),
         )
 
+    def to_survey(self, axis: int) -> bool:
+        """Whether `survey` could tell anything new of the tracks across the axis."""
+        return awaits_survey(self._filter.held, axis)
+
     def survey(self, axis: int, places_m: Mapping[int, float], sigma_m: float) -> None:
-        """Tracks, by their ids, are lines of the map that lie there, m across the axis, give or take
-        `sigma_m`."""
+        """Tracks, by their ids, are lines of the map that lie there, m across the axis, to `sigma_m`."""
         if self._compensation is TiltCompensation.EXACT:
             self._filter.survey(axis, places_m, sigma_m)
 
