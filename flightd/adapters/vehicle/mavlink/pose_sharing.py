@@ -62,9 +62,10 @@ class PoseSharing:
         is carried on by the autopilot's own word, which its estimator carries on itself."""
         output = self._output
         self._flown = state.armed and (self._flown or pose is not None or state.landed is LandedState.IN_AIR)
-        if output is None or self.use is not PoseUse.GIVEN:
+        stands = self._stands(state)
+        if output is None or not (stands or pose is not None) or self.use is not PoseUse.GIVEN:
             return
-        if self._stands(state):
+        if stands:
             message = output.make_standing(now_ns, state.attitude, state.height_m)
         elif pose is not None:
             message = output.make(now_ns, pose, state.climb_mps)
@@ -90,7 +91,11 @@ class PoseSharing:
 def pose_use(rules: tuple[Rule, ...], read: Read) -> PoseUse:
     """What becomes of our motion by an autopilot's parameters: those `rules` that are optional have to fit
     where it has them."""
-    if any(read(rule.names) is None for rule in rules if not rule.optional):
-        return PoseUse.UNKNOWN
-    fits = all(judge(rule, read(rule.names)) is None for rule in rules)
-    return PoseUse.GIVEN if fits else PoseUse.NOT_TAKEN
+    use = PoseUse.GIVEN
+    for rule in rules:
+        found = read(rule.names)
+        if found is None and not rule.optional:
+            return PoseUse.UNKNOWN
+        if judge(rule, found) is not None:
+            use = PoseUse.NOT_TAKEN
+    return use
