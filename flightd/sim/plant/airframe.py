@@ -9,9 +9,8 @@ an argument, and the same seed and commands give the same flight.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass
-
-import numpy as np
 
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.plant.kinematics import Kinematics
@@ -108,7 +107,7 @@ class Airframe:
         return self._open_v(self.battery_frac) - p.battery_resistance_ohm * self.current_a
 
     def _open_v(self, charge: float) -> float:
-        return self.params.battery_cells * float(np.interp(charge, _CHARGE, _CELL_V))
+        return self.params.battery_cells * _cell_v(charge)
 
     @property
     def air_mps(self) -> tuple[float, float, float]:
@@ -138,8 +137,9 @@ class Airframe:
         self._blow(dt_s)
         self._spin(dt_s, command)
         self._turn(dt_s, command)
-        self._move(dt_s)
-        self._drain(dt_s, self.lift(self.collective), motors=command.motors)
+        lift = self.lift(self.collective)
+        self._move(dt_s, lift)
+        self._drain(dt_s, lift, motors=command.motors)
 
     def _blow(self, dt_s: float) -> None:
         self.wind.step(dt_s)
@@ -202,9 +202,9 @@ class Airframe:
         left = 1.0 - self.collective / (self.params.hover_collective * most)
         return min(max(_LEAST_AUTHORITY, left / _FREE_LIFT), 1.0)
 
-    def _move(self, dt_s: float) -> None:
-        p = self.params
-        lift = GRAVITY_MPS2 * self.lift(self.collective)
+    def _move(self, dt_s: float, load: float) -> None:
+        """Under motors that lift a `load` in weights."""
+        p, lift = self.params, GRAVITY_MPS2 * load
         sin_roll, cos_roll = math.sin(self.roll_rad), math.cos(self.roll_rad)
         sin_pitch, cos_pitch = math.sin(self.pitch_rad), math.cos(self.pitch_rad)
         sin_yaw, cos_yaw = math.sin(self.yaw_rad), math.cos(self.yaw_rad)
@@ -247,3 +247,12 @@ class Airframe:
         self.current_a = p.idle_current_a + (p.hover_current_a * load**1.5 if motors and load > 0 else 0.0)
         used_frac = self.current_a * dt_s / (p.battery_capacity_ah * 3600.0)
         self.battery_frac = max(0.0, self.battery_frac - used_frac)
+
+
+def _cell_v(charge: float) -> float:
+    """A cell's voltage at rest; read several times in each step, for which numpy's own way is too long."""
+    after = bisect_right(_CHARGE, charge)
+    if after in {0, len(_CHARGE)}:
+        return _CELL_V[max(after - 1, 0)]
+    (charge_0, charge_1), (v_0, v_1) = _CHARGE[after - 1 : after + 1], _CELL_V[after - 1 : after + 1]
+    return (v_1 - v_0) / (charge_1 - charge_0) * (charge - charge_0) + v_0

@@ -40,6 +40,14 @@ def test_a_battery_that_sags_takes_thrust_as_it_empties() -> None:
     assert Airframe(battery_frac=0.1).lift(HOVER) == 1.0
 
 
+def test_a_cell_rests_at_a_voltage_between_those_of_its_table() -> None:
+    per_cell_v = [
+        Airframe(battery_frac=charge).battery_v / AirframeParams().battery_cells
+        for charge in (-0.1, 0.0, 0.025, 0.5, 0.65, 0.9, 1.0, 1.1)
+    ]
+    assert per_cell_v == pytest.approx([3.3, 3.3, 3.4, 3.84, 3.93, 4.11, 4.2, 4.2])
+
+
 def test_motors_lift_no_more_than_they_can_and_turn_less_near_it() -> None:
     weak = AirframeParams(thrust_to_weight=1.7)
     assert Airframe(weak).lift(1.0) == 1.7
