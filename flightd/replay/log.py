@@ -34,6 +34,7 @@ from flightd.runtime.mcap_scan import (
 Decoder: TypeAlias = Callable[[bytes], object]
 MessageT = TypeVar("MessageT")
 
+_MESSAGE = int(Opcode.MESSAGE)
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time; then the payload."""
 
@@ -121,20 +122,21 @@ class LogReader:
                 self.damage = ", ".join(damage)
                 return
             try:
-                if record.opcode == Opcode.CHUNK:
-                    for inner in inner_records(unpacked(parse(Chunk, record.content))):
-                        yield from self._take(inner)
-                else:
-                    yield from self._take(record)
+                is_chunk = record.opcode == Opcode.CHUNK
+                within = inner_records(unpacked(parse(Chunk, record.content))) if is_chunk else (record,)
+                for one in within:
+                    if (message := self._taken(one)) is not None:
+                        yield message
             except DamagedRecordError as err:
                 damage.append(str(err))
                 self.damage = ", ".join([*damage, _CUT])
 
-    def _take(self, record: RawRecord) -> Iterator[_Message]:
-        if record.opcode == Opcode.MESSAGE and len(record.content) >= _MESSAGE_HEAD.size:
+    def _taken(self, record: RawRecord) -> _Message | None:
+        """The message that a record is; None for any other, of which what is needed is kept."""
+        if record.opcode == _MESSAGE and len(record.content) >= _MESSAGE_HEAD.size:
             channel_id, _, stamp_ns, _ = _MESSAGE_HEAD.unpack_from(record.content)
-            yield channel_id, stamp_ns, record.content[_MESSAGE_HEAD.size :]
-        elif record.opcode == Opcode.CHANNEL:
+            return channel_id, stamp_ns, record.content[_MESSAGE_HEAD.size :]
+        if record.opcode == Opcode.CHANNEL:
             channel = parse(Channel, record.content)
             if channel.message_encoding == "json":
                 self._channels[channel.id] = channel.topic
@@ -142,6 +144,7 @@ class LogReader:
             metadata = parse(Metadata, record.content)
             if metadata.name == "flightd":
                 self.metadata.update(metadata.metadata)
+        return None
 
 
 def decoded_message(path: Path, topic: str, payload: bytes) -> object:
