@@ -11,6 +11,8 @@ from functools import partial
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import cv2
+import msgspec
+import numpy as np
 
 from flightd.app.frame_pool import FramePool
 from flightd.core.types import Image, LineSet
@@ -18,10 +20,21 @@ from flightd.ports import Clock
 from flightd.runtime.clock import Hold
 from flightd.runtime.frame_ring import FrameTicket
 
-_Lines: TypeAlias = "tuple[LineSet, bytes | None]"
+_Answer: TypeAlias = "tuple[bytes, bytes | None]"
+"""Packed lines, and the JPEG: a frame's hundred small messages are pickled in ten times as long."""
 
 _MOST_AHEAD = 8
 """Frames looked at ahead and not asked for yet: more than are on their way from any camera."""
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"a {type(value).__name__} is not what a detector finds")
+
+
+_packed = msgspec.msgpack.Encoder(enc_hook=_plain).encode
+_unpacked = msgspec.msgpack.Decoder(LineSet).decode
 
 
 class Detect(Protocol):
@@ -78,12 +91,12 @@ class _DetectLines:
         self._detector = make()
         self._ahead: OrderedDict[tuple[str, int], Any] = OrderedDict()
 
-    def __call__(self, bgr: Image, ticket: FrameTicket, wanted: Wanted) -> _Lines | None:
+    def __call__(self, bgr: Image, ticket: FrameTicket, wanted: Wanted) -> _Answer | None:
         if wanted is Wanted.AHEAD:
             self._look_ahead(bgr, ticket)
             return None
         jpeg = cv2.imencode(".jpg", bgr)[1].tobytes() if wanted is Wanted.LINES_AND_JPEG else None
-        return self._lines(bgr, ticket), jpeg
+        return _packed(self._lines(bgr, ticket)), jpeg
 
     def _look_ahead(self, bgr: Image, ticket: FrameTicket) -> None:
         if isinstance(self._detector, LooksAhead):
@@ -98,7 +111,7 @@ class _DetectLines:
         return self._detector.detect(bgr, ticket.seq, ticket.stamp_ns)
 
 
-class DetectorPool(FramePool[Wanted, "_Lines | None"]):
+class DetectorPool(FramePool[Wanted, "_Answer | None"]):
     """Processes that find the lines; `make` builds the detector inside each and must be picklable."""
 
     def __init__(
@@ -117,7 +130,8 @@ class DetectorPool(FramePool[Wanted, "_Lines | None"]):
         found = await self.ask(ticket, Wanted.LINES_AND_JPEG if with_jpeg else Wanted.LINES)
         if found is None:
             return None
-        return Detection(ticket, found[0], started_ns, self._clock.now_ns(), found[1])
+        lines, jpeg = found
+        return Detection(ticket, _unpacked(lines), started_ns, self._clock.now_ns(), jpeg)
 
     def look_ahead(self, ticket: FrameTicket) -> None:
         """Begin with a frame whose pixels are there before it arrives: in a simulation it is under way for

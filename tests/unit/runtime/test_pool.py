@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import signal
 import socket
@@ -17,7 +18,17 @@ from flightd.app.detection.detector_pool import Detection, DetectorPool
 from flightd.app.frame_pool import FramePool, Work
 from flightd.app.simulation.lockstep import LockstepDetectors
 from flightd.core.errors import TransientError, UnavailableError
-from flightd.core.types import Image, LineSet
+from flightd.core.types import (
+    FloorFeature,
+    Image,
+    Junction,
+    JunctionKind,
+    Line,
+    LineSet,
+    MarkerSight,
+    PadSight,
+    PictureCheck,
+)
 from flightd.runtime.clock import LoopClock
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
 from tests.rigs.event_loops import real, virtual
@@ -181,6 +192,42 @@ def test_the_ring_refuses_foreign_names_and_slots() -> None:
         assert np.all(ring.pixels(0) == 0)
     finally:
         ring.close()
+
+
+EVERYTHING = LineSet(
+    frame_seq=7,
+    stamp_ns=(1 << 60) + 1,
+    width_px=640,
+    height_px=360,
+    lines=(Line(-12.5, 0.1, 5.3, -80.0, 0.1 + 0.2, 0.9, 0.01, 1e-17, -3e-4),),
+    junctions=(Junction(next(iter(JunctionKind)), 1.0, -2.0, (0.5, math.pi)),),
+    method="combined",
+    timings_ms={"colour": 0.25},
+    pads=(PadSight(1.5, 2.5, 99.0, 0.8),),
+    picture=PictureCheck((1 << 63) + 5, 112.4, 9.1),
+    markers=(MarkerSight(3, -4.0, 5.0, 17.0),),
+    features=(FloorFeature(12, 0.5, -0.25),),
+)
+
+
+class SeesEverything:
+    def detect(self, bgr: Image, seq: int = 0, stamp_ns: int = 0) -> LineSet:
+        return EVERYTHING
+
+
+def test_all_that_a_detector_finds_comes_to_the_last_bit() -> None:
+    async def main() -> Detection | None:
+        ring = FrameRing.create(2, 64, 36)
+        try:
+            with DetectorPool(partial(SeesEverything), 1, 1.0, LoopClock()) as pool:
+                await pool.ready()
+                return await pool.detect(ticket(ring, 1, 5))
+        finally:
+            ring.close()
+
+    found = real(main())
+    assert found is not None
+    assert repr(found.lines) == repr(EVERYTHING)
 
 
 def methods(found: list[Detection | None]) -> list[str | None]:
