@@ -142,10 +142,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         deadline = None
         while True:
             events = real.select(0)
-            ready = {key.fd for key, _ in events}
-            missing = [
-                port for port, count in self._in_flight.items() if count and self._ports[port] not in ready
-            ]
+            under_way = [port for port, count in self._in_flight.items() if count]
+            ready = {key.fd for key, _ in events} if under_way else set()
+            missing = [port for port in under_way if self._ports[port] not in ready]
             if not missing:
                 return _in_order(events)
             if deadline is None:
@@ -159,7 +158,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
 def _in_order(events: list[Any]) -> list[Any]:
     """Epoll's order depends on arrival; the file descriptors' does not."""
-    return sorted(events, key=lambda event: event[0].fd)
+    return sorted(events, key=lambda event: event[0].fd) if len(events) > 1 else events
 
 
 class _CountedTransport(asyncio.DatagramTransport):
