@@ -97,6 +97,9 @@ def sim(
     it leaves what was flown so far, with 128 and the signal's number; a second time, it ends at once.
     Of --scenario all each flight's row is in OUT/sweep.jsonl as soon as it ended; interrupted, the same
     command goes on with the rest."""
+    from flightd.runtime.child_process import start_child_server
+
+    start_child_server()
     from flightd.app.simulation.prepare import SimOptions
 
     options = SimOptions(

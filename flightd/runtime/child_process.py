@@ -17,6 +17,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from multiprocessing import forkserver
 from multiprocessing.context import ForkServerContext
 from typing import Any
 
@@ -42,6 +43,14 @@ def child_context() -> ForkServerContext:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOAD)
     return context
+
+
+def start_child_server() -> None:
+    """Let what children are forked from load the vision code from now on, while this process loads what it
+    needs itself: the first child would have to wait for it."""
+    child_context()
+    with undisturbed():
+        forkserver.ensure_running()
 
 
 class LinkedProcess:
