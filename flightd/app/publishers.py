@@ -60,6 +60,11 @@ class TelemetryPublishers:
         )
         self.trouble(failure.error)
 
+    def tells(self, snapshot: Snapshot) -> bool:
+        """Whether `publish` would tell this tick to everybody; of the others only the record needs something:
+        what was given and answered, the lateness and latencies, and the failure."""
+        return snapshot.stamp_ns - self._told_ns >= _STATUS_NS or snapshot.phase is not self._told_phase
+
     def publish(self, snapshot: Snapshot) -> None:
         """A tick: its events to everybody, all of it to the record, unless nothing happens for long; ten
         times a second and at each change of phase it is told to everybody."""
@@ -70,7 +75,7 @@ class TelemetryPublishers:
             self.barrier.call("recorder", lambda: _record(self._recorder, snapshot), None)
         self._late_s += snapshot.tick_late_s
         self._latencies_ms += snapshot.latencies_ms
-        if snapshot.stamp_ns - self._told_ns >= _STATUS_NS or snapshot.phase is not self._told_phase:
+        if self.tells(snapshot):
             self._tell(snapshot)
 
     def over(self) -> None:

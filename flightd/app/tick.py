@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flightd.adapters.store.progress import LeftOver
 from flightd.app.flight import Flight
 from flightd.app.guarded_step import GuardedStep
@@ -138,26 +140,34 @@ class Tick:
         }
 
     def _snapshot(self, tick: TickInput, output: TickOutput, late_s: float) -> Snapshot:
-        flight, pilot, call = self._flight, self._flight.pilot, self._call
-        vision = flight.vision
+        """What the record needs of a tick, and all the rest at those that are told to people."""
         self._count_losses(tick.health)
-        return Snapshot(
+        flight = self._flight
+        snapshot = Snapshot(
             tick,
             output,
+            tick_late_s=(late_s,),
+            latencies_ms=flight.vision.drain_latencies_ms(),
+            failure=self._step.failure,
+        )
+        return self._with_outlook(snapshot) if flight.publishers.tells(snapshot) else snapshot
+
+    def _with_outlook(self, snapshot: Snapshot) -> Snapshot:
+        flight, pilot, call = self._flight, self._flight.pilot, self._call
+        vision, now_ns = flight.vision, snapshot.stamp_ns
+        return replace(
+            snapshot,
             nodes_done=call("mission", lambda: len(set(pilot.mission.visited)), 0),
             nodes_planned=pilot.plan.nodes,
             frames=flight.camera.frames,
             frames_dropped=sum(vision.dropped.values()),
             fps=vision.fps,
             latency_ms=vision.latency_ms,
-            tick_late_s=(late_s,),
-            latencies_ms=vision.drain_latencies_ms(),
             dropped=self.dropped,
             restarts=self.restarts,
             repeated_level=flight.setpoints.stale,
             possible=call("mission", self._possible_commands, frozenset()),
-            failure=self._step.failure,
             height_goal_m=call("mission", lambda: pilot.mission.height_goal_m, 0.0),
             view_m=call("mission", lambda: pilot.mission.view_m, None),
-            outlook=call("mission", lambda: pilot.mission.outlook(tick.now_ns), NO_OUTLOOK),
+            outlook=call("mission", lambda: pilot.mission.outlook(now_ns), NO_OUTLOOK),
         )

@@ -11,6 +11,7 @@ from flightd.app.build import assemble, pilot_of
 from flightd.app.publishers import TelemetryPublishers
 from flightd.app.tick import Tick
 from flightd.core.flight_order import FlightOrder
+from flightd.core.outlook import Outlook
 from flightd.core.tick import StepFailure, TickInput
 from flightd.core.topics import Topic
 from flightd.core.types import (
@@ -24,6 +25,7 @@ from flightd.core.types import (
     Phase,
     VehicleState,
 )
+from flightd.mission.mission import Mission
 from flightd.mission.safety.last_resort import LastResort
 from tests.sim.ideal.ideal_ports import HeldSetpoint, IdealGround, IdealRecorder, IdealVehicle, IdealVision
 from tests.sim.ideal.test_ideal_scan import CONFIG
@@ -192,3 +194,22 @@ def test_a_stop_behind_an_order_that_fails_is_obeyed(monkeypatch: pytest.MonkeyP
     flight.commands = []
     flight.run(1.02)
     assert (mission.phase, mission.reason) == (Phase.ABORTED, "stop ordered")
+
+
+def test_what_only_people_are_told_is_asked_of_the_mission_when_they_are_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Ten times a second, and at each of sixty ticks all that the record keeps."""
+    flight, asked = Ticked(), list[int]()
+    outlook = Mission.outlook
+
+    def counted(mission: Mission, now_ns: int) -> Outlook:
+        asked.append(now_ns)
+        return outlook(mission, now_ns)
+
+    monkeypatch.setattr(Mission, "outlook", counted)
+    for tick in range(60):
+        flight.run(1.0 + tick / 60)
+    assert len(flight.of(Topic.TICK)) == 60
+    assert 9 <= len(asked) <= 11
+    assert len(flight.of(Topic.STATUS)) == len(asked)
