@@ -18,7 +18,7 @@ from flightd.sim.sensors.optics import SimCamera, wide_lens
 from flightd.site.site_file import load_site
 
 SITE = load_site(Path(__file__).parents[2] / "configs" / "site-demo.toml")
-FRAMES = 120
+FRAMES = 60
 
 
 def along_the_aisle(frame: int) -> Kinematics:

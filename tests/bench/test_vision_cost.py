@@ -14,7 +14,7 @@ LIMITS = {"centroid": 1.7, "skeleton": 2.4, "combined": 3.0}
 """Ceilings against a slow change creeping in: two thirds above what is measured on a busy machine."""
 MOST_BESIDES = 2.6
 """All that a flight asks of a frame, as a multiple of the lines alone; measured: 1.7."""
-FRAMES = 16
+FRAMES = 8
 
 Timings = dict[tuple[str, tuple[int, int]], Timing]
 
