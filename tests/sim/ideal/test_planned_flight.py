@@ -11,6 +11,7 @@ from flightd.core.flight_order import ChosenPlan
 from flightd.core.planned_flight import PlannedFlight
 from flightd.core.topics import Topic
 from flightd.core.types import Command, CommandKind, Phase
+from tests.rigs.brisk import BRISK
 from tests.sim.ideal.ideal_flight import Flown, IdealFlight
 from tests.sim.ideal.ideal_front import IdealFront, Label, Stock
 from tests.unit.mission.shelves import FITTED, SIGHT, SITE
@@ -18,6 +19,7 @@ from tests.unit.mission.shelves import FITTED, SIGHT, SITE
 CONFIG = load_config(Path(__file__).parents[3] / "configs" / "sim.toml").with_values(
     front_camera=FITTED, scan={"mode": ScanMode.STOP}, mission={"autostart": False, "start_countdown_s": 0.0}
 )
+BRISKLY = CONFIG.with_values(mission=BRISK)
 ON_GROUND = {Phase.PREFLIGHT, Phase.ARMING, Phase.DONE}
 
 
@@ -78,7 +80,7 @@ def of(*counts: ShelfCount) -> set[str]:
 
 def test_it_counts_at_each_node_the_side_and_levels_that_are_told_for_it_alone() -> None:
     low, right = ShelfCount("A2", "left", (1,)), ShelfCount("A3", "right")
-    flight, said = flown("A2", "A3", "A4", counts=(low, right))
+    flight, said = flown("A2", "A3", "A4", counts=(low, right), config=BRISKLY)
     assert (flight.phase, flight.visited) == (Phase.DONE, ["A2", "A3", "A4"])
     assert counted(flight) == of(low, right)
     assert said.places == len(of(low, right))
@@ -87,12 +89,13 @@ def test_it_counts_at_each_node_the_side_and_levels_that_are_told_for_it_alone()
 def test_a_goto_says_what_is_counted_at_its_node_whatever_the_plan_says() -> None:
     low, other = ShelfCount("A2", "left", (1,)), ShelfCount("A3", "left")
     told = Command("goto-0001", CommandKind.GOTO, node="A4", counts=(ShelfCount("A4", "right", (2,)),))
-    flight, _ = flown("A2", "A3", counts=(low, other), then=told)
+    flight, _ = flown("A2", "A3", counts=(low, other), then=told, config=BRISKLY)
     assert counted(flight) == of(low, ShelfCount("A4", "right", (2,)))
 
 
 def test_a_goto_that_says_nothing_of_it_has_all_counted_there() -> None:
-    flight, _ = flown("A2", counts=(), then=Command("goto-0001", CommandKind.GOTO, node="A4"))
+    told = Command("goto-0001", CommandKind.GOTO, node="A4")
+    flight, _ = flown("A2", counts=(), then=told, config=BRISKLY)
     assert counted(flight) == of(ShelfCount("A4"))
 
 
