@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from flightd.config.control import TiltCompensation
-from flightd.tracking.tilt_compensation import GroundLine, point_tilt_effects, tilt_effects
+from flightd.core.types import FloorFeature
+from flightd.tracking.tilt_compensation import (
+    FloorView,
+    GroundLine,
+    floor_points,
+    point_tilt_effects,
+    tilt_effects,
+)
 
 _PARALLEL_RAD = math.radians(20.0)
 """A line further than this from both grid axes is none of the grid."""
 _LEAST_SIGMA_RAD = math.radians(0.2)
+_FARTHEST = 3.0
+"""A feature further off than so many heights is told by hardly anything."""
 _LEVEL = (0.0, 0.0)
 _GATE_RAD, _GATE_SIGMAS = math.radians(4.0), 4.0
 
@@ -129,6 +139,23 @@ def line_sight(
         bent_m=bent_m,
         turned_rad=turned_rad,
     )
+
+
+def feature_sights(
+    features: Sequence[FloorFeature], view: FloorView, yaw_rad: float, sigma_rad: float
+) -> list[FeatureSight]:
+    """The features of one frame, each known to `sigma_rad` as it is seen; `yaw_rad` is that on the grid."""
+    if not features:
+        return []
+    tilt, height_m = (view.attitude.roll_rad, view.attitude.pitch_rad), view.height_m
+    sigma_m = height_m * math.hypot(sigma_rad, view.sigma_tilt_rad)
+    leans = view.mount.roll_rad, view.mount.pitch_rad
+    points = floor_points([(seen.x_px, seen.y_px) for seen in features], view)
+    return [
+        feature_sight(seen.id, point, yaw_rad, tilt, height_m, sigma_m, leans)
+        for seen, point in zip(features, points, strict=bool(points))
+        if math.hypot(*point) < _FARTHEST * height_m
+    ]
 
 
 def feature_sight(

@@ -31,9 +31,8 @@ from flightd.tracking.heading_dispute import HeadingDispute, Turned
 from flightd.tracking.heading_vote import heading_vote
 from flightd.tracking.held_lines import awaits_survey
 from flightd.tracking.line_sight import (
-    FeatureSight,
     as_compensated,
-    feature_sight,
+    feature_sights,
     line_sight,
     turn_of,
 )
@@ -54,15 +53,12 @@ from flightd.tracking.rolling_shutter import ImageMotion, as_of_one_moment
 from flightd.tracking.tilt_compensation import (
     FloorView,
     GroundLine,
-    floor_points,
     ground_lines,
     heights_by_width,
 )
 from flightd.tracking.width_heights import NearFloor, WidthHeights, climbed_between_m
 
 _STEP_NS = 20_000_000
-_FARTHEST = 3.0
-"""A feature further off than so many heights is told by hardly anything."""
 _WATCHED_NS = 10_000_000_000
 """For so long without a line the drift of gyros stays within degrees."""
 _HARDLY_RISEN_M = 0.5
@@ -241,7 +237,9 @@ class LineTracker:
             line_sight(line, yaw, sigma_yaw, tilt, height_m, params.min_sigma_m, leans) for line in on_floor
         )
         sights = [as_compensated(sight, self._compensation) for sight in placed if sight is not None]
-        features = self._features(lines, view, yaw)
+        # without an exact compensation they do not move as its lines do
+        told = lines.features if self._compensation is TiltCompensation.EXACT else ()
+        features = feature_sights(told, view, yaw, params.feature_sigma_px / self._lens.fx_px)
         rates, exact = self._history.rates(stamp_ns), self._compensation is TiltCompensation.EXACT
         believed = features if self._trust.holds else []
         for axis in self._filter.update(sights, rates, stamp_ns, believed, assumed=assumed, exact=exact):
@@ -416,21 +414,6 @@ class LineTracker:
             vy += ay * dt_s
             stamp_ns += step_ns
         return Carried((vx, vy), (moved_x, moved_y), (ax, ay))
-
-    def _features(self, lines: LineSet, view: FloorView, yaw_rad: float) -> list[FeatureSight]:
-        """The features of one frame.  Without an exact compensation they do not move as its lines do."""
-        if not lines.features or self._compensation is not TiltCompensation.EXACT:
-            return []
-        tilt, height_m = (view.attitude.roll_rad, view.attitude.pitch_rad), view.height_m
-        by_px = self._params.feature_sigma_px * height_m / self._lens.fx_px
-        sigma_m = math.hypot(by_px, height_m * view.sigma_tilt_rad)
-        leans = view.mount.roll_rad, view.mount.pitch_rad
-        points = floor_points([(seen.x_px, seen.y_px) for seen in lines.features], view)
-        return [
-            feature_sight(seen.id, point, yaw_rad, tilt, height_m, sigma_m, leans)
-            for seen, point in zip(lines.features, points, strict=bool(points))
-            if math.hypot(*point) < _FARTHEST * height_m
-        ]
 
     def _speed_sigma(self, axis: int, ahead_s: float) -> float:
         """Of the speed along an axis so long after the newest frame."""
