@@ -159,7 +159,7 @@ class FramePool(Generic[AskT, FoundT]):
         """Let the worker that will be asked about a frame have this first, with no answer.  Of several nobody
         knows which that is: then nothing is told."""
         if self._size == 1:
-            for worker in self._workers:
+            for worker in tuple(self._workers):  # one that has died is replaced at once
                 worker.tell((ticket, ask))
 
     def _lose(self, why: str) -> None:

@@ -97,10 +97,8 @@ def sim(
     it leaves what was flown so far, with 128 and the signal's number; a second time, it ends at once.
     Of --scenario all each flight's row is in OUT/sweep.jsonl as soon as it ended; interrupted, the same
     command goes on with the rest."""
-    from flightd.runtime.child_process import start_child_server
-
-    start_child_server()
     from flightd.app.simulation.prepare import SimOptions
+    from flightd.runtime.child_process import start_child_server
 
     options = SimOptions(
         config,
@@ -116,6 +114,7 @@ def sim(
         camera,
     )
     options.check()
+    start_child_server()  # while the rest is imported
     _fly_all(options, scenario or [], seeds, out, as_json=as_json)
 
 
@@ -125,7 +124,7 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
     from flightd.app.simulation.prepare import prepare
     from flightd.app.simulation.scenario_sweep import Origin, hazard_scenarios
     from flightd.app.simulation.sweep_log import SweepLog, asked_of
-    from flightd.app.simulation.sweep_routes import AS_SET, route_of
+    from flightd.app.simulation.sweep_routes import ALONG, AS_SET, route_of
     from flightd.cli.scenario_sweep import fly_seeds, sweep
     from flightd.sim.scenario.scenario import Scenario
     from flightd.sim.scenario.scenario_files import load_scenarios
@@ -138,10 +137,9 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
             return prepare(replace(options, seed=seed), conditions, folder, _say, sweep_route=route.setting)
 
         # what cannot be flown at all is refused here
-        own = any(text.startswith("mission.nodes") for text in options.settings)
+        own = any(text.partition("=")[0].strip() == "mission.nodes" for text in options.settings)
         routes = (lambda *_: AS_SET) if own else route_of
-        for seed in every[:2]:  # one of each route
-            route = routes(seed, Scenario())
+        for route in {AS_SET} if own else {ALONG, *(routes(seed, Scenario()) for seed in every[:2])}:
             first = prepare(options, Scenario(), out, lambda _: None, sweep_route=route.setting)
         origin = Origin(options.world, first.config.vehicle.kind, flown_code())
         asked = asked_of(options, len(hazard_scenarios()) * seeds, seeds)

@@ -60,12 +60,14 @@ class Reference:
 class Conditions:
     """What else control goes by: the acceleration that no told lean explains (grid axes), against which it
     leans, by how much slower than configured it answers, 1 as configured, the roll and pitch that are told of
-    a drone that is level, and what of that acceleration a leap of the told lean left out."""
+    a drone that is level; whether the told lean has leapt, and what of the push on a drone that sees nothing
+    is put down to that."""
 
     unleant_mps2: tuple[float, float] = (0.0, 0.0)
     ease: float = 1.0
     level_rad: tuple[float, float] = (0.0, 0.0)
-    leapt_mps2: tuple[float, float] = (0.0, 0.0)
+    leapt: bool = False
+    blind_mps2: tuple[float, float] = (0.0, 0.0)
 
 
 CALM = Conditions()

@@ -137,7 +137,7 @@ class StateEstimator:
         self._judged_ns = self._shared_ns = 0
         self._frames_s = 0.0
         self._unleant = (0.0, 0.0)
-        self._risen = False
+        self._risen = self._is_high = False
         self._level = ToldLevel(self._config.tracking.expert.priors.attitude_s)
         self.armed = armed
 
@@ -155,11 +155,13 @@ class StateEstimator:
         self._risen = self._risen or (v is not None and v.may_fly)
         # once it is told to rise it may lean already; what levels itself by how it stands tells nothing of it
         stands = v is not None and not (self._risen or v.hovers_unsteered) and commanded is None
+        height_m = self._heights.at(tick.now_ns)
+        self._is_high = height_m > _LEAPS_ABOVE_M or (self._is_high and math.isnan(height_m))
         for sample in tick.attitudes:
             late_s = max((tick.now_ns - sample.stamp_ns) * 1e-9, 0.0)
             self._telemetry_s += _LATE_GAIN * (min(late_s, _MOST_LATE_S) - self._telemetry_s)
             self._attitude_ns = sample.stamp_ns
-            leap = self.tracker.attitude(sample, leaps=self._heights.at(tick.now_ns) > _LEAPS_ABOVE_M)
+            leap = self.tracker.attitude(sample, leaps=self._is_high)
             if leap != LEVEL:
                 self._level.leaps(sample.stamp_ns, leap)
             self.poses.add_attitude(sample)
@@ -295,8 +297,15 @@ class StateEstimator:
         now_x, now_y = tracker.unleant(now_ns)
         self._unleant = x, y = x + part * (now_x - x), y + part * (now_y - y)
         ease = min(max(_FREE_S / total_s, _LEAST_EASE), 1.0)
-        leapt = tracker.leapt(now_ns)  # is answered at once
-        return Conditions((x + leapt[0], y + leapt[1]), ease, self._level.at(now_ns), leapt)
+        leapt_x, leapt_y = tracker.leapt(now_ns)  # is answered at once
+        blind_x, blind_y = tracker.leant(now_ns, self._level.by_leaps(now_ns))
+        return Conditions(
+            (x + leapt_x, y + leapt_y),
+            ease,
+            self._level.at(now_ns),
+            leapt=bool(leapt_x or leapt_y),
+            blind_mps2=(-blind_x, -blind_y),
+        )
 
     def _take_frame(self, lines: LineSet) -> None:
         exposed_ns, carried = self.tracker.exposed_ns(lines), self._carried

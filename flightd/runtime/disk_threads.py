@@ -31,11 +31,15 @@ class DiskThreads:
         self._room = threading.Semaphore(most)
 
     async def run(self, work: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """What `work` returns or raises; TransientError where so much is under way that the disk hangs.  A
-        caller that is cancelled leaves the work to end by itself."""
+        """What `work` returns or raises; TransientError where so much is under way that the disk hangs.  Work
+        that has begun ends by itself where its caller is cancelled; what has not never begins."""
         if not self._room.acquire(blocking=False):
             raise TransientError("a disk does not answer, and too much waits for it already")
-        begun = self._threads.submit(work, *args, **kwargs)
+        try:
+            begun = self._threads.submit(work, *args, **kwargs)
+        except BaseException:  # there is no room for another thread
+            self._room.release()
+            raise
         begun.add_done_callback(lambda _: self._room.release())
         return await asyncio.wrap_future(begun)
 

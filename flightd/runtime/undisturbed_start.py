@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 
+_ENDING = signal.SIGINT, signal.SIGTERM
+
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
@@ -28,17 +30,19 @@ def undisturbed() -> Iterator[None]:
 @contextmanager
 def _put_off() -> Iterator[None]:
     """Another thread may take the signal, whose handler then runs in the main one: it runs at the end.  A
-    loop's own is told by a descriptor, which is silent meanwhile: it would hear of the signal twice."""
+    loop's own is told by a descriptor, which is silent meanwhile, for SIGTERM too: it would hear of the
+    one twice, and of the other not at all."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    came: list[int] = []
+    came: set[int] = set()
     told = signal.set_wakeup_fd(-1)
-    handler = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    handlers = [(number, signal.signal(number, lambda one, _: came.add(one))) for number in _ENDING]
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, handler)
+        for number, handler in handlers:
+            signal.signal(number, handler)
         signal.set_wakeup_fd(told, warn_on_full_buffer=False)
-        if came:
-            signal.raise_signal(signal.SIGINT)
+        for late in sorted(came):
+            signal.raise_signal(late)

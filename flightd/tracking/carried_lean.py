@@ -8,19 +8,23 @@ from typing import NamedTuple
 
 from flightd.core.types import Attitude
 
-LEAP_RAD, _STAMPS_S = math.radians(1.0), 0.02
-"""A told roll or pitch that turns by more than this between two samples, and by more than the rate turns it
-in so long, by which stamps may be wrong, while the gyros felt none of it, leaps: the autopilot takes another
-estimator's, or its own anew."""
+LEAP_RAD, _OFTEN_S, _STAMPS_S = math.radians(1.0), 0.02, 0.02
+"""A told roll or pitch that turns by more than this between two samples, in longer than `_OFTEN_S` by as much
+more, and by more than the rate turns it in `_STAMPS_S`, by which stamps may be wrong, while the gyros felt
+none of it, leaps: the autopilot takes another estimator's, or its own anew."""
 GAP_S = 0.06
 """Over longer ones two rates do not tell what was turned between them."""
+_NOISE_S, _SIGMAS = 1.0, 5.0
+"""Nor is what shaking makes of the rates a leap."""
 _MOST_RADPS = 10.0
-_TURNED_RAD2, _MOST_TURNED_RAD2, _UNEXPLAINED = math.radians(2.0) ** 2, math.radians(5.0) ** 2, 0.2
-"""Gyros are believed that have explained turns of that sum of squares, all but so much of it; the sum holds
-the newest ones up to the second."""
+_WINDOW_S = 0.1
+_TURNED_RAD2, _MOST_TURNED_RAD2, _UNEXPLAINED = math.radians(1.0) ** 2, math.radians(3.5) ** 2, 0.2
+"""Gyros are believed that have explained turns, each over a window, of that sum of squares, all but so much
+of it; the sum holds the newest ones up to the second."""
 _PROOF_S = 60.0
 _MOST_LEAPS, _WITHIN_NS = 2, 1_000_000_000
-"""No estimator leaps more often: then it is the gyros that are wrong."""
+"""No estimator leaps more often, nor in two samples one after the other the same way: then it is the gyros
+that are wrong, and have to prove themselves anew."""
 _MOST_RAD = math.radians(10.0)
 
 
@@ -73,20 +77,45 @@ class CarriedLean:
         dt_s = (sample.stamp_ns - last.stamp_ns) * 1e-9
         if dt_s > GAP_S:
             return
-        turns = (
-            (self._roll, sample.roll_rad - last.roll_rad, last.roll_rate_radps, sample.roll_rate_radps),
-            (self._pitch, sample.pitch_rad - last.pitch_rad, last.pitch_rate_radps, sample.pitch_rate_radps),
-        )
-        leapt = [gyro.leapt_rad(sample.stamp_ns, told, rates, dt_s) for gyro, told, *rates in turns]
-        if leaps and any(leapt):
-            self.leap = Lean(*leapt)
+        roll_rates = last.roll_rate_radps, sample.roll_rate_radps
+        pitch_rates = last.pitch_rate_radps, sample.pitch_rate_radps
+        lead, stamp_ns = self._lead, sample.stamp_ns
+        told = sample.roll_rad - last.roll_rad, sample.pitch_rad - last.pitch_rad
+        roll = self._roll.step(stamp_ns, Turn(told[0], roll_rates, dt_s), lead.roll_rad, leaps=leaps)
+        pitch = self._pitch.step(stamp_ns, Turn(told[1], pitch_rates, dt_s), lead.pitch_rad, leaps=leaps)
+        if roll or pitch:
+            self.leap = Lean(roll, pitch)
             self.leaps += 1
-            self._lead = Lean(*(_bounded(at - by) for at, by in zip(self._lead, self.leap, strict=True)))
-        # what was taken for leaps was none
-        if self._roll.is_wrong:
-            self._lead = self._lead._replace(roll_rad=0.0)
-        if self._pitch.is_wrong:
-            self._lead = self._lead._replace(pitch_rad=0.0)
+            self._lead = Lean(_bounded(lead.roll_rad - roll), _bounded(lead.pitch_rad - pitch))
+
+
+class Turn(NamedTuple):
+    """Of one angle between two samples: what was told, the gyro's rates at both, and the time."""
+
+    told_rad: float
+    rates_radps: tuple[float, float]
+    dt_s: float
+
+    @property
+    def felt_rad(self) -> float:
+        return 0.5 * sum(self.rates_radps) * self.dt_s
+
+    @property
+    def fastest_radps(self) -> float:
+        return max(map(abs, self.rates_radps))
+
+    @property
+    def is_felt(self) -> bool:
+        return math.isfinite(sum(self.rates_radps)) and self.fastest_radps <= _MOST_RADPS
+
+    @property
+    def apart_rad(self) -> float:
+        return self.told_rad - self.felt_rad
+
+    @property
+    def most_apart_rad(self) -> float:
+        """What is no leap yet, of gyros that do not shake."""
+        return LEAP_RAD * max(self.dt_s / _OFTEN_S, 1.0) + _STAMPS_S * self.fastest_radps
 
 
 class _Gyro:
@@ -94,28 +123,30 @@ class _Gyro:
 
     def __init__(self) -> None:
         self._turned_rad2 = self._unexplained_rad2 = 0.0
+        self._told_rad = self._felt_rad = self._window_s = self._noise_rad2 = 0.0
         self._leapt_ns: deque[int] = deque(maxlen=_MOST_LEAPS)
-        self.is_wrong = False
-        """It was found wrong, and has not been found right since."""
+        self._leapt_rad = 0.0
+        """What the sample before leapt by."""
 
-    def leapt_rad(self, stamp_ns: int, told_rad: float, rates_radps: list[float], dt_s: float) -> float:
-        """What was told to be turned more than was felt between two samples; 0 where that is no leap."""
-        fastest = max(abs(rate) for rate in rates_radps)
-        felt_rad = 0.5 * sum(rates_radps) * dt_s
-        if not (math.isfinite(felt_rad) and fastest <= _MOST_RADPS):
+    def step(self, stamp_ns: int, turn: Turn, lead_rad: float, *, leaps: bool) -> float:
+        """What was told to be turned more than was felt, 0 where that is no leap; `lead_rad` is what has been
+        carried so far, and leaps back where the gyro is found to be wrong."""
+        before_rad, self._leapt_rad = self._leapt_rad, 0.0
+        if not turn.is_felt:
             return 0.0
-        explains = self._explains
-        self.is_wrong = self.is_wrong and not explains
-        apart_rad = told_rad - felt_rad
-        leaps = explains and abs(apart_rad) > LEAP_RAD + _STAMPS_S * fastest
-        self._mind(told_rad, 0.0 if leaps else apart_rad, dt_s)
+        most_rad, apart_rad = max(turn.most_apart_rad, _SIGMAS * math.sqrt(self._noise_rad2)), turn.apart_rad
+        is_turn = abs(apart_rad) <= most_rad
+        if is_turn or (leaps and not self._explains):
+            self._mind(turn)
+            return 0.0
         if not leaps:
             return 0.0
         often = len(self._leapt_ns) == _MOST_LEAPS and stamp_ns - self._leapt_ns[0] < _WITHIN_NS
+        if often or before_rad * apart_rad > 0.0:
+            self._turned_rad2 = self._unexplained_rad2 = 0.0
+            return lead_rad
         self._leapt_ns.append(stamp_ns)
-        if often:
-            self._unexplained_rad2, self.is_wrong = self._turned_rad2, True
-            return 0.0
+        self._leapt_rad = apart_rad
         return apart_rad
 
     @property
@@ -123,13 +154,20 @@ class _Gyro:
         few = self._turned_rad2 < _TURNED_RAD2
         return not few and self._unexplained_rad2 < _UNEXPLAINED * self._turned_rad2
 
-    def _mind(self, told_rad: float, unexplained_rad: float, dt_s: float) -> None:
-        """Add up squares, of what leaps at most those of a leap."""
-        kept = math.exp(-dt_s / _PROOF_S)
-        turned = kept * self._turned_rad2 + min(told_rad**2, LEAP_RAD**2)
-        unexplained = kept * self._unexplained_rad2 + min(unexplained_rad**2, LEAP_RAD**2)
+    def _mind(self, turn: Turn) -> None:
+        """Add up squares of turns over a window each, in which noise averages out."""
+        self._noise_rad2 += min(turn.dt_s / _NOISE_S, 1.0) * (turn.apart_rad**2 - self._noise_rad2)
+        self._told_rad += turn.told_rad
+        self._felt_rad += turn.felt_rad
+        self._window_s += turn.dt_s
+        if self._window_s < _WINDOW_S:
+            return
+        kept = math.exp(-self._window_s / _PROOF_S)
+        turned = kept * self._turned_rad2 + self._told_rad**2
+        unexplained = kept * self._unexplained_rad2 + (self._told_rad - self._felt_rad) ** 2
         share = min(_MOST_TURNED_RAD2 / turned, 1.0) if turned else 1.0
         self._turned_rad2, self._unexplained_rad2 = share * turned, share * unexplained
+        self._told_rad = self._felt_rad = self._window_s = 0.0
 
 
 def _bounded(lead_rad: float) -> float:

@@ -384,6 +384,12 @@ class LineTracker:
         told_x, told_y = self._leant(carried.leant_by(-lead.roll_rad, -lead.pitch_rad))
         return x - told_x, y - told_y
 
+    def leant(self, now_ns: int, lean_by: Lean) -> tuple[float, float]:
+        """Acceleration along the grid axes (m/s2) that such a lean makes in the heading of now."""
+        if not any(lean_by):
+            return 0.0, 0.0
+        return self._leant(Attitude(now_ns, *lean_by, self._attitude_at(now_ns).yaw_rad))
+
     def _leant(self, lean_of: Attitude) -> tuple[float, float]:
         """Acceleration along the grid axes that such a lean makes, were it free of errors."""
         told = Told(lean_of.roll_rad, lean_of.pitch_rad, lean_of.yaw_rad)

@@ -39,9 +39,12 @@ class ToldLevel:
 
     def at(self, now_ns: int) -> tuple[float, float]:
         """Roll and pitch, rad."""
-        stood = _fading(self._stood, self._left(now_ns, self._stood_ns))
-        leapt = _fading(self._leapt, self._left(now_ns, self._leapt_ns))
+        stood, leapt = _fading(self._stood, self._left(now_ns, self._stood_ns)), self.by_leaps(now_ns)
         return stood.roll_rad + leapt.roll_rad, stood.pitch_rad + leapt.pitch_rad
+
+    def by_leaps(self, now_ns: int) -> Lean:
+        """What of it leaps have made."""
+        return _fading(self._leapt, self._left(now_ns, self._leapt_ns))
 
     def _left(self, now_ns: int, since_ns: int) -> float:
         return math.exp(-max(now_ns - since_ns, 0) * 1e-9 / self._fade_s)

@@ -7,6 +7,7 @@ import os
 import shutil
 import sys
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -19,6 +20,7 @@ from flightd.ground.access.roles import Role
 from flightd.ground.server import Listening
 from flightd.ground.site_page import simulated_flight
 from tests.rigs.event_loops import in_real_time
+from tests.rigs.waiting import until as until_true
 from tests.web.people_rig import audited, with_people
 from tests.web.served import Station, served, told
 
@@ -62,6 +64,10 @@ async def ask(
 ) -> tuple[int, str]:
     path = f"/api/site/simulation?name={quote(name)}"
     return await station.ask(method, path, {"Origin": station.origin, **(by or {})})
+
+
+def _holds(file: Path, text: str) -> bool:
+    return file.exists() and file.read_text() == text
 
 
 async def until(page: ClientConnection, **wanted: Any) -> dict[str, Any]:
@@ -124,7 +130,7 @@ async def test_a_good_flight_is_told_as_its_summary_has_it_and_may_be_flown_agai
 
 
 @in_real_time
-async def test_it_is_told_to_end_once_and_killed_at_the_stations_end_where_it_does_not_listen(
+async def test_it_is_told_to_end_as_often_as_people_ask_and_killed_at_the_stations_end(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stand_in(monkeypatch, stubborn=True)
@@ -133,11 +139,12 @@ async def test_it_is_told_to_end_once_and_killed_at_the_stations_end_where_it_do
         below = json.loads((await ask(station, "POST"))[1])["folder"]
         await until(page, last="hold 0/8 nodes")
         pid = int((folder / below / "pid").read_text())
-        for _ in range(2):
+        for asked in ("x", "xx"):
             assert (await ask(station, "DELETE"))[0] == 200
+            await until_true(partial(_holds, folder / below / "asked", asked))
         assert is_alive(pid)
     assert not is_alive(pid)
-    assert (folder / below / "asked").read_text() == "x", "twice would be at once"
+    assert (folder / below / "asked").read_text() == "xx", "the station's own end is no third wish"
 
 
 @in_real_time

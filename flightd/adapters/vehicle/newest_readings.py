@@ -93,7 +93,6 @@ class NewestReadings:
         """One attitude; by its rates nobody is to reckon over a time that is not known."""
         yaw_rate, *leaning = angle_rates(angles[0], angles[1], body_radps)
         roll_rate, pitch_rate = (math.nan, math.nan) if self._time_broke else leaning
-        self._time_broke = False
         return Attitude(stamp_ns, *angles, yaw_rate, roll_rate, pitch_rate)
 
     def attitudes(self) -> list[Attitude]:

@@ -13,7 +13,7 @@ from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.launch import FlightInterruptedError, fly
 from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.sweep_log import SweepLog, SweptRow
-from flightd.app.simulation.sweep_routes import SweepRoute, digest
+from flightd.app.simulation.sweep_routes import ROUTES, SweepRoute, digest
 from flightd.core.errors import FlightdError
 from flightd.core.snapshot import Snapshot
 from flightd.core.utc_time import utc_day
@@ -74,7 +74,8 @@ def fly_every_hazard(
                     row = _row(name, _unjudged(hazard), str(err), shipped.needs_real_time, seed, origin)
                 else:
                     row = _flown(name, hazard, simulation, observe, origin)
-                row |= {"route": route.name, "scenario": digest(paths[name])}
+                shown = digest(paths[name]) if route in ROUTES else ""  # another one is evidence of none
+                row |= {"route": route.name, "scenario": shown}
                 log.append(row)
             yield row
 

@@ -117,9 +117,11 @@ class SimulatedFlight:
         return below
 
     def end(self) -> None:
-        """End the one that flies, in order.  RunError where none does."""
+        """End the one that flies, in order; asked again, at once.  RunError where none does."""
         if self._process is None or self._process.returncode is not None:
             raise RunError("no simulated flight is under way")
+        if self._ends:
+            self._process.terminate()
         self._end_in_order(self._process)
 
     def _end_in_order(self, process: asyncio.subprocess.Process) -> None:

@@ -54,7 +54,9 @@ class Steering:
         motion = self._motion(pose, height_m, dt_s, stand_yaw_rad, lead)
         control, reference = self._control, guidance.reference.after(lead.after_s)
         sight_s, ease = min(inputs.x_age_s, inputs.y_age_s), self._plausibility.oscillation.ease
-        rises, leapt = guidance.phase is Phase.TAKE_OFF, conditions.leapt_mps2
+        rises, blind = guidance.phase is Phase.TAKE_OFF, conditions.blind_mps2
+        # since a leap the speed is dead-reckoned by what is known of the attitude
+        by_unleant = rises or (conditions.leapt and guidance.dead_reckoned)
         if guidance.guide is Guide.NONE:
             control.reset()
             return None
@@ -66,7 +68,7 @@ class Steering:
                 motion,
                 reference,
                 dt_s,
-                conditions.unleant_mps2 if rises else (push[0] + leapt[0], push[1] + leapt[1]),
+                conditions.unleant_mps2 if by_unleant else (push[0] + blind[0], push[1] + blind[1]),
                 dead_reckoned=guidance.dead_reckoned,
                 ease=min(ease, conditions.ease) if rises else ease,
             )

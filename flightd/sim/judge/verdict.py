@@ -191,7 +191,7 @@ def _staying_armed(flight: FlightEvidence) -> Iterator[JudgedFault]:
             first_s, last_s = max(down_s, since_s), min(up_s, until_s)
             if first_s <= last_s == end_s < until_s < math.inf:  # it was heard for longer than it was seen
                 last_s = until_s
-            at_the_end = first_s <= last_s == end_s
+            at_the_end = until_s == math.inf and first_s <= last_s == end_s
             if last_s - first_s > _STAYS_ARMED_S or at_the_end:
                 wrong.append((first_s, last_s - first_s))
     if wrong:

@@ -307,6 +307,18 @@ def test_a_boot_clock_that_jumps_back_is_a_reboot() -> None:
     assert telemetry.attitudes()[-1].stamp_ns == NOW_NS + 50 * MS
 
 
+def test_over_a_time_that_is_not_known_nobody_reckons_by_the_rates_of_roll_and_pitch() -> None:
+    sync = ClockSync()
+    telemetry = MavlinkTelemetry(sync)
+    sync.answered(sync.ask(NOW_NS), 60_000 * MS, NOW_NS)
+    for number, off_ms in enumerate((0, 0, -700, 0, 0)):  # one strays
+        telemetry.take(attitude(60_000 + 20 * number + off_ms), NOW_NS + 20 * number * MS)
+    told = [math.isfinite(one.roll_rate_radps + one.pitch_rate_radps) for one in telemetry.attitudes()]
+    assert told.count(False) == 1
+    assert told[0]
+    assert told[-1]
+
+
 def test_the_fastest_of_the_round_trips_counts() -> None:
     sync = ClockSync()
     for delay_ms in (30, 4, 50, 80):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -13,6 +14,33 @@ from flightd.mission.guidance import Guide
 from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from tests.unit.mission.configured import configured
 from tests.unit.mission.driven import SITE, TICK_NS, Flight
+
+
+@pytest.mark.parametrize(
+    ("leapt", "dead_reckoned", "against_mps2"),
+    [(True, True, 0.5), (True, False, 0.1 + 0.25), (False, True, 0.1), (False, False, 0.1)],
+)
+def test_a_brake_leans_against_a_leap_by_what_is_known_of_the_motion(
+    leapt: bool, dead_reckoned: bool, against_mps2: float
+) -> None:
+    """While the speed is dead-reckoned, by all that no told lean explains, as the speed is; then by the push
+    and as much of the leap as is believed of a drone that sees nothing."""
+    config, flight = configured(), Flight()
+    steering = Steering(config.control, PlausibilityMonitor(SITE, config))
+    flight.to(Phase.FOLLOW)
+    assert flight.guidance is not None
+    guidance = replace(flight.guidance, guide=Guide.BRAKE, dead_reckoned=dead_reckoned)
+    conditions = Conditions(
+        unleant_mps2=(0.0, 0.5), leapt=leapt, blind_mps2=(0.0, 0.25) if leapt else (0.0, 0.0)
+    )
+    inputs, setpoint = flight.inputs, None
+    assert inputs.pose is not None
+    still = replace(inputs.pose, vx_mps=0.0, vy_mps=0.0, yaw_rad=0.0)
+    for _ in range(100):
+        inputs = replace(inputs, now_ns=inputs.now_ns + TICK_NS, pose=still)
+        setpoint = steering.step(inputs, guidance, (0.0, 0.1), 0.0, conditions=conditions)
+    assert setpoint is not None
+    assert setpoint.roll_rad == pytest.approx(-math.atan(against_mps2 / 9.80665), abs=0.002)
 
 
 def test_level_is_the_attitude_that_is_told_of_a_level_drone() -> None:

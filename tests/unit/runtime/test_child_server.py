@@ -20,7 +20,12 @@ for pid in open(f"/proc/self/task/{os.getpid()}/children").read().split():
 """
 
 
-def test_the_server_of_children_starts_when_told_and_ends_with_its_parent() -> None:
-    done = subprocess.run([sys.executable, "-c", STARTS_IT], capture_output=True, text=True, check=True)
-    (server,) = done.stdout.split()
+START_S = 60.0
+
+
+def test_the_server_of_children_starts_when_told_and_ends_with_its_parent(tmp_path: Path) -> None:
+    told = tmp_path / "server"
+    with told.open("w") as out:  # a pipe would be held open by the server
+        subprocess.run([sys.executable, "-c", STARTS_IT], stdout=out, check=True, timeout=START_S)
+    (server,) = told.read_text().split()
     real(asyncio.wait_for(until(lambda: not Path("/proc", server, "exe").exists()), 20.0))

@@ -46,29 +46,30 @@ def test_an_interrupt_meanwhile_comes_when_the_start_is_done() -> None:
     assert done
 
 
-def test_a_loop_hears_once_of_an_interrupt_that_another_thread_takes_meanwhile() -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_loop_hears_once_of_a_signal_that_another_thread_takes_meanwhile(number: signal.Signals) -> None:
     async def test() -> None:
         came: list[int] = []
         loop, begun = asyncio.get_running_loop(), threading.Event()
 
         def take() -> None:
             begun.wait()
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
 
         taking = threading.Thread(target=take)
         taking.start()
-        loop.add_signal_handler(signal.SIGINT, came.append, 1)
+        loop.add_signal_handler(number, came.append, 1)
         try:
             with undisturbed():
                 begun.set()
                 taking.join()
             await asyncio.sleep(0.05)
         finally:
-            loop.remove_signal_handler(signal.SIGINT)
+            loop.remove_signal_handler(number)
         assert came == [1]
 
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.getsignal(number)
     try:
         real(test())
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(number, before)

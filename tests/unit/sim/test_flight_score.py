@@ -231,7 +231,8 @@ def test_one_that_disarms_as_the_truth_ends_has_disarmed() -> None:
     down = landed(at(S), at(7 * S))
     last_s = down[-1].stamp_ns * 1e-9
     late_s = last_s + 30.0
-    for off_s, stays in ((last_s - 0.2, False), (last_s + 0.01, False), (late_s, True), (None, True)):
+    cases = ((last_s - 0.2, False), (last_s, False), (last_s + 0.01, False), (late_s, True), (None, True))
+    for off_s, stays in cases:
         off = [] if off_s is None else [ArmedChange(round(off_s * S), armed=False)]
         found = kinds(evidence(down, [DONE], armed=[ArmedChange(0, armed=True), *off]))
         assert ("stayed_armed" in found) is stays

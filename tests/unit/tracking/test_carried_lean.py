@@ -16,9 +16,9 @@ FADE_S = 8.0
 LEAP_S, LEAP_RAD = 2.0, math.radians(3.0)
 
 
-def leaning(at_s: float) -> tuple[float, float]:
+def leaning(at_s: float, swing_rad: float = math.radians(6.0)) -> tuple[float, float]:
     """Roll of a drone that brakes and sets off, by 12 degrees within a quarter of a second, and its rate."""
-    swing_rad, fast = math.radians(6.0), 4.0 * math.pi
+    fast = 4.0 * math.pi
     return swing_rad * (1.0 - math.cos(fast * at_s)), swing_rad * fast * math.sin(fast * at_s)
 
 
@@ -29,24 +29,20 @@ def carried(
     *,
     until_s: float = 3.0,
     lost: Callable[[float], bool] = lambda _: False,
+    period_s: float = PERIOD_S,
+    swing_rad: float = math.radians(6.0),
 ) -> tuple[CarriedLean, list[tuple[float, float]]]:
     """How far the carried roll is from the true one, by time, where the told one errs so, the gyros feel so
     much of a rate, and stamps are so late."""
     lean, found = CarriedLean(FADE_S), []
-    for sample in range(round(until_s / PERIOD_S) + 1):
-        at_s = sample * PERIOD_S
+    for sample in range(round(until_s / period_s) + 1):
+        at_s = sample * period_s
         if lost(at_s):
             continue
-        true_rad, rate = leaning(at_s)
-        told = true_rad + error(at_s)
-        rates = {"roll_rate_radps": felt(at_s, rate), "pitch_rate_radps": 0.0}
-        found.append(
-            (
-                at_s,
-                lean.take(Attitude(round((at_s + late(at_s)) * 1e9), told, 0.0, 0.0, **rates)).roll_rad
-                - true_rad,
-            )
-        )
+        true_rad, rate = leaning(at_s, swing_rad)
+        stamp_ns, told = round((at_s + late(at_s)) * 1e9), true_rad + error(at_s)
+        sample_told = Attitude(stamp_ns, told, 0.0, 0.0, 0.0, felt(at_s, rate), 0.0)
+        found.append((at_s, lean.take(sample_told).roll_rad - true_rad))
     return lean, found
 
 
@@ -128,12 +124,57 @@ def test_gyros_that_shake_carry_nothing_astray(rms_degps: float) -> None:
     assert max(abs(error) for _, error in found) < math.radians(1.5)
 
 
-def test_a_gyro_that_dies_in_flight_carries_nothing_for_long() -> None:
-    lean, found = carried(lambda _: 0.0, lambda at_s, rate: rate if at_s < 10.0 else 0.0, until_s=20.0)
+@pytest.mark.parametrize("period_s", [0.01, 0.02, 0.04, 0.05])
+@pytest.mark.parametrize("swing_deg", [3.0, 6.0, 12.0])
+@pytest.mark.parametrize("dies_s", [10.0, 10.1, 10.2])
+def test_a_gyro_that_dies_in_flight_carries_nothing_for_long(
+    period_s: float, swing_deg: float, dies_s: float
+) -> None:
+    _, found = carried(
+        lambda _: 0.0,
+        lambda at_s, rate: rate if at_s < dies_s else 0.0,
+        until_s=20.0,
+        period_s=period_s,
+        swing_rad=math.radians(swing_deg),
+    )
     wrong_s = [at_s for at_s, error in found if abs(error) > math.radians(1.0)]
-    assert len(wrong_s) * PERIOD_S < 1.0
-    assert abs(found[-1][1]) < math.radians(0.1)
-    assert lean.leaps < 5
+    assert len(wrong_s) * period_s < 1.0
+    assert abs(found[-1][1]) < math.radians(0.5)
+
+
+@pytest.mark.parametrize("period_s", [0.01, 0.02, 0.05])
+def test_a_calm_hover_proves_gyros_too(period_s: float) -> None:
+    """Half a degree to either side, with the noise of a cheap gyro."""
+    noise = rough(1, math.radians(0.5))
+    lean, _ = carried(
+        lambda at_s: leaps(at_s - 6.0),
+        lambda at_s, rate: rate + noise(at_s),
+        until_s=9.0,
+        period_s=period_s,
+        swing_rad=math.radians(0.5),
+    )
+    assert lean.leaps == 1
+    assert lean.lead_at(0).roll_rad == pytest.approx(-LEAP_RAD, rel=0.2)
+
+
+def test_an_estimator_that_does_not_settle_is_no_gyros_fault_for_good() -> None:
+    """The third leap within a second takes back what was carried; soon after, leaps are believed anew."""
+
+    def error(at_s: float) -> float:
+        flips = sum(at_s >= LEAP_S + 0.3 * number for number in range(3)) % 2
+        return LEAP_RAD * flips + (2.0 * LEAP_RAD if at_s >= LEAP_S + 4.0 else 0.0)
+
+    lean, found = carried(error, until_s=LEAP_S + 4.2)
+    told_s = {round(at_s, 2): wrong for at_s, wrong in found}
+    assert told_s[round(LEAP_S + 0.7, 2)] == pytest.approx(LEAP_RAD, rel=0.1), "as it is told"
+    assert found[-1][1] == pytest.approx(LEAP_RAD, rel=0.1), "as before the last leap"
+    assert lean.leaps == 4
+
+
+def test_what_is_told_otherwise_over_two_samples_is_as_it_is_told() -> None:
+    lean, found = carried(lambda at_s: leaps(at_s) / 2 + leaps(at_s - PERIOD_S) / 2)
+    assert found[-1][1] == pytest.approx(LEAP_RAD, rel=0.1)
+    assert abs(lean.lead_at(0).roll_rad) < math.radians(0.1)
 
 
 @pytest.mark.parametrize("late_s", [0.005, 0.01])

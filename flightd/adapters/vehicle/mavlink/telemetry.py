@@ -154,6 +154,7 @@ class MavlinkTelemetry(NewestReadings):
             self._attitude = sample = self._sample(stamp_ns, angles, body_radps)
             if stamp_ns > last_ns:
                 self._attitudes.append(sample)
+                self._time_broke = False
         return rebooted
 
     def _take_global_position(self, message: Message, now_ns: int) -> None:

@@ -83,6 +83,7 @@ class MavsdkTelemetry(NewestReadings):
             about_x, about_y, about_z = body_radps
             self._attitude = self._sample(stamp_ns, (roll, pitch, yaw), (about_x, about_y, about_z))
             self._attitudes.append(self._attitude)
+            self._time_broke = False
 
     def take_range(self, document: str, now_ns: int) -> None:
         """The fields of a DISTANCE_SENSOR, cm, as they came: in the library's own form of it neither the
