@@ -139,7 +139,9 @@ def _fly_all(options: SimOptions, scenario: Sequence[str], seeds: int, out: Path
         # what cannot be flown at all is refused here
         own = any(text.partition("=")[0].strip() == "mission.nodes" for text in options.settings)
         routes = (lambda *_: AS_SET) if own else route_of
-        for route in {AS_SET} if own else {ALONG, *(routes(seed, Scenario()) for seed in every[:2])}:
+        for route in dict.fromkeys(
+            [AS_SET] if own else [ALONG, *(routes(seed, Scenario()) for seed in every[:2])]
+        ):
             first = prepare(options, Scenario(), out, lambda _: None, sweep_route=route.setting)
         origin = Origin(options.world, first.config.vehicle.kind, flown_code())
         asked = asked_of(options, len(hazard_scenarios()) * seeds, seeds)
@@ -169,7 +171,7 @@ def _fly(simulation: Simulation, *, as_json: bool) -> None:
         try:
             result = fly(replace(simulation, observer=progress))
         except FlightInterruptedError as err:
-            end_at_once_on_signals()  # its report takes a while, too
+            end_at_once_on_signals(after_s=0.0)  # its report takes a while, too
             if err.result is None:
                 _say(str(err))
                 raise typer.Exit(128 + err.signal) from None

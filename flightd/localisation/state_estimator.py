@@ -41,6 +41,8 @@ _ATTITUDE_LAG_S = 0.2
 """Of an attitude loop of 10 rad/s, for which the gains are."""
 _UNLEANT_S = 0.1
 """Over so long a push is averaged before it is leant against."""
+_LEAPT_MPS2 = 0.03
+"""What is left of a leap and makes less is over."""
 _LEAPS_ABOVE_M = 0.5
 """Nearer to the floor a body that touches it turns faster than is told."""
 _MAP_SIGMA_M = 0.02
@@ -155,7 +157,7 @@ class StateEstimator:
         self._risen = self._risen or (v is not None and v.may_fly)
         # once it is told to rise it may lean already; what levels itself by how it stands tells nothing of it
         stands = v is not None and not (self._risen or v.hovers_unsteered) and commanded is None
-        height_m = self._heights.at(tick.now_ns)
+        height_m = self._carried.at(tick.now_ns, self._heights.at(tick.now_ns), self._climbed.at(tick.now_ns))
         self._is_high = height_m > _LEAPS_ABOVE_M or (self._is_high and math.isnan(height_m))
         for sample in tick.attitudes:
             late_s = max((tick.now_ns - sample.stamp_ns) * 1e-9, 0.0)
@@ -303,7 +305,7 @@ class StateEstimator:
             (x + leapt_x, y + leapt_y),
             ease,
             self._level.at(now_ns),
-            leapt=bool(leapt_x or leapt_y),
+            leapt=math.hypot(leapt_x, leapt_y) > _LEAPT_MPS2,
             blind_mps2=(-blind_x, -blind_y),
         )
 

@@ -37,9 +37,9 @@ class DiskThreads:
             raise TransientError("a disk does not answer, and too much waits for it already")
         try:
             begun = self._threads.submit(work, *args, **kwargs)
-        except BaseException:  # there is no room for another thread
+        except RuntimeError as err:  # there is no room for another thread
             self._room.release()
-            raise
+            raise TransientError(f"no thread for the disk: {err}") from err
         begun.add_done_callback(lambda _: self._room.release())
         return await asyncio.wrap_future(begun)
 

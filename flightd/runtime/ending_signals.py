@@ -46,13 +46,13 @@ def end_on_signals(
         loop.add_signal_handler(number, end, number)
 
 
-def end_at_once_on_signals() -> None:
-    """From now on either signal ends this process, and all that it started, with 128 and its number: also
+def end_at_once_on_signals(after_s: float = _ONE_WISH_S) -> None:
+    """From then on either signal ends this process, and all that it started, with 128 and its number: also
     where its loop hangs, or has ended.  Main thread only."""
     since_s = monotonic()
 
     def end(number: int, _: FrameType | None) -> None:
-        if monotonic() - since_s >= _ONE_WISH_S:
+        if monotonic() - since_s >= after_s:
             _end_at_once(number)
 
     for number in _ENDING:

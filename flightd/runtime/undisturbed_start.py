@@ -13,7 +13,8 @@ _ENDING = signal.SIGINT, signal.SIGTERM
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """While entered, SIGINT waits, and a process started from this thread is born with it blocked.
+    """While entered, SIGINT waits (in the main thread SIGTERM, too), and a process started from this thread
+    is born with it blocked.
 
     A terminal sends Ctrl-C to the whole group; a child that is still importing would die of it with a
     traceback of its own.  Ending the child is its parent's task.
@@ -36,13 +37,13 @@ def _put_off() -> Iterator[None]:
         yield
         return
     came: set[int] = set()
-    told = signal.set_wakeup_fd(-1)
     handlers = [(number, signal.signal(number, lambda one, _: came.add(one))) for number in _ENDING]
+    told = signal.set_wakeup_fd(-1)
     try:
         yield
     finally:
+        signal.set_wakeup_fd(told, warn_on_full_buffer=False)  # first: rather heard twice than not at all
         for number, handler in handlers:
             signal.signal(number, handler)
-        signal.set_wakeup_fd(told, warn_on_full_buffer=False)
         for late in sorted(came):
             signal.raise_signal(late)

@@ -55,11 +55,8 @@ class CarriedLean:
 
     def lead_at(self, stamp_ns: int) -> Lean:
         """The carried roll and pitch less the told ones, at or after the newest sample."""
-        last = self._last
-        if last is None or self._lead == LEVEL:
-            return LEVEL
-        kept = math.exp(min(last.stamp_ns - stamp_ns, 0) * 1e-9 / self._fade_s)
-        return Lean(kept * self._lead.roll_rad, kept * self._lead.pitch_rad)
+        roll, pitch = self._faded(stamp_ns)
+        return Lean(_bounded(roll), _bounded(pitch))
 
     def take(self, sample: Attitude, *, leaps: bool = True) -> Attitude:
         """The sample with roll and pitch as they are carried on; one that is not newer than the last is told
@@ -67,15 +64,25 @@ class CarriedLean:
         turns faster than two rates tell."""
         last, self.leap = self._last, LEVEL
         if last is None or sample.stamp_ns > last.stamp_ns:
-            self._lead = self.lead_at(sample.stamp_ns)
+            self._lead = self._faded(sample.stamp_ns)
             self._last = sample
             if last is not None:
                 self._follow(last, sample, leaps=leaps)
-        return sample.leant_by(*self._lead)
+        return sample.leant_by(*self.lead_at(sample.stamp_ns))
+
+    def _faded(self, stamp_ns: int) -> Lean:
+        """The lead as all leaps together make it: what leaps back cancels what leapt, however far."""
+        last = self._last
+        if last is None or self._lead == LEVEL:
+            return LEVEL
+        kept = math.exp(min(last.stamp_ns - stamp_ns, 0) * 1e-9 / self._fade_s)
+        return Lean(kept * self._lead.roll_rad, kept * self._lead.pitch_rad)
 
     def _follow(self, last: Attitude, sample: Attitude, *, leaps: bool) -> None:
         dt_s = (sample.stamp_ns - last.stamp_ns) * 1e-9
         if dt_s > GAP_S:
+            self._roll.pause()
+            self._pitch.pause()
             return
         roll_rates = last.roll_rate_radps, sample.roll_rate_radps
         pitch_rates = last.pitch_rate_radps, sample.pitch_rate_radps
@@ -86,7 +93,7 @@ class CarriedLean:
         if roll or pitch:
             self.leap = Lean(roll, pitch)
             self.leaps += 1
-            self._lead = Lean(_bounded(lead.roll_rad - roll), _bounded(lead.pitch_rad - pitch))
+            self._lead = Lean(lead.roll_rad - roll, lead.pitch_rad - pitch)
 
 
 class Turn(NamedTuple):
@@ -130,15 +137,19 @@ class _Gyro:
 
     def step(self, stamp_ns: int, turn: Turn, lead_rad: float, *, leaps: bool) -> float:
         """What was told to be turned more than was felt, 0 where that is no leap; `lead_rad` is what has been
-        carried so far, and leaps back where the gyro is found to be wrong."""
+        carried so far: all of it leaps back where the gyro no longer explains what is told, and where the
+        told angle leaps back, be it at the floor or in the midst of a turn."""
         before_rad, self._leapt_rad = self._leapt_rad, 0.0
         if not turn.is_felt:
             return 0.0
+        least_rad = 0.5 * LEAP_RAD
+        if abs(turn.apart_rad - lead_rad) < least_rad < min(abs(turn.apart_rad), abs(lead_rad)):
+            return lead_rad
         most_rad, apart_rad = max(turn.most_apart_rad, _SIGMAS * math.sqrt(self._noise_rad2)), turn.apart_rad
         is_turn = abs(apart_rad) <= most_rad
         if is_turn or (leaps and not self._explains):
             self._mind(turn)
-            return 0.0
+            return 0.0 if self._explains else lead_rad
         if not leaps:
             return 0.0
         often = len(self._leapt_ns) == _MOST_LEAPS and stamp_ns - self._leapt_ns[0] < _WITHIN_NS
@@ -148,6 +159,10 @@ class _Gyro:
         self._leapt_ns.append(stamp_ns)
         self._leapt_rad = apart_rad
         return apart_rad
+
+    def pause(self) -> None:
+        """The sample to come is none right after the last."""
+        self._leapt_rad = 0.0
 
     @property
     def _explains(self) -> bool:

@@ -35,7 +35,7 @@ class ToldLevel:
         before = _fading(self._leapt, self._left(stamp_ns, self._leapt_ns))
         share = 1.0 / (2.0 - self._left(stamp_ns, self._stood_ns) ** 2)
         self._leapt_ns = stamp_ns
-        self._leapt = Lean(*(_bounded(at + share * by) for at, by in zip(before, leap, strict=True)))
+        self._leapt = Lean(*(at + share * by for at, by in zip(before, leap, strict=True)))
 
     def at(self, now_ns: int) -> tuple[float, float]:
         """Roll and pitch, rad."""
@@ -44,7 +44,8 @@ class ToldLevel:
 
     def by_leaps(self, now_ns: int) -> Lean:
         """What of it leaps have made."""
-        return _fading(self._leapt, self._left(now_ns, self._leapt_ns))
+        leapt = _fading(self._leapt, self._left(now_ns, self._leapt_ns))
+        return Lean(_bounded(leapt.roll_rad), _bounded(leapt.pitch_rad))
 
     def _left(self, now_ns: int, since_ns: int) -> float:
         return math.exp(-max(now_ns - since_ns, 0) * 1e-9 / self._fade_s)

@@ -122,7 +122,8 @@ class SimulatedFlight:
             raise RunError("no simulated flight is under way")
         if self._ends:
             self._process.terminate()
-        self._end_in_order(self._process)
+        else:
+            self._end_in_order(self._process)
 
     def _end_in_order(self, process: asyncio.subprocess.Process) -> None:
         """Once: a second signal would end it at once."""

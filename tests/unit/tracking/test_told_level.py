@@ -41,6 +41,13 @@ def test_later_either_may_be_right() -> None:
     assert abs(level.at(91 * S)[0]) < 0.2 * DEG
 
 
+def test_what_leaps_far_and_back_leaves_nothing() -> None:
+    level = stood()
+    level.leaps(11 * S, Lean(8.0 * DEG, 0.0))
+    level.leaps(12 * S, Lean(-8.0 * DEG, 0.0))
+    assert abs(level.by_leaps(12 * S).roll_rad) < DEG
+
+
 def test_no_leap_has_it_lean_by_much_and_standing_again_ends_it() -> None:
     level = stood()
     level.leaps(11 * S, Lean(20.0 * DEG, 0.0))
