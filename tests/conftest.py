@@ -7,12 +7,10 @@ from __future__ import annotations
 import gc
 import os
 from collections.abc import Generator
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
-import typer.main
 from hypothesis import HealthCheck, settings
 
 from tests.command import Command
@@ -24,7 +22,6 @@ settings.register_profile(
     "flightd", deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("flightd")
-typer.main.get_command = cache(typer.main.get_command)  # all commands built anew take 30 ms of each call
 
 _IN_CI = os.environ.get("CI", "") == "true"
 _PATIENCE = pytest.StashKey[Patience]()

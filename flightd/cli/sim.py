@@ -171,7 +171,7 @@ def _fly(simulation: Simulation, *, as_json: bool) -> None:
         try:
             result = fly(replace(simulation, observer=progress))
         except FlightInterruptedError as err:
-            end_at_once_on_signals(after_s=0.0)  # its report takes a while, too
+            end_at_once_on_signals()  # its report takes a while, too
             if err.result is None:
                 _say(str(err))
                 raise typer.Exit(128 + err.signal) from None

@@ -10,13 +10,10 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from time import monotonic
 from types import FrameType
 from typing import Any, Final
 
 _ENDING: Final = (signal.SIGINT, signal.SIGTERM)
-_ONE_WISH_S: Final = 0.5
-"""Two signals within this time are one: a terminal tells a group, and its leader tells it again."""
 _STDERR: Final = 2
 _CURSOR: Final = "\x1b[?25h"
 """Shows a terminal's cursor again, which a live view hides."""
@@ -46,20 +43,14 @@ def end_on_signals(
         loop.add_signal_handler(number, end, number)
 
 
-def end_at_once_on_signals(after_s: float = _ONE_WISH_S) -> None:
-    """From then on either signal ends this process, and all that it started, with 128 and its number: also
+def end_at_once_on_signals() -> None:
+    """From now on either signal ends this process, and all that it started, with 128 and its number: also
     where its loop hangs, or has ended.  Main thread only."""
-    since_s = monotonic()
-
-    def end(number: int, _: FrameType | None) -> None:
-        if monotonic() - since_s >= after_s:
-            _end_at_once(number)
-
     for number in _ENDING:
-        signal.signal(number, end)
+        signal.signal(number, _end_at_once)
 
 
-def _end_at_once(number: int) -> None:
+def _end_at_once(number: int, _: FrameType | None) -> None:
     for pid in _descendants(os.getpid()):
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.kill(pid, signal.SIGKILL)

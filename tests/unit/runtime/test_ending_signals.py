@@ -36,7 +36,7 @@ def test_the_second_signal_ends_the_process_with_all_its_children(how: str, numb
             said = f"flightd: {number.name}: it ends in order; a second one ends it at once\n"
             assert process.stderr.readline() == said
             with pytest.raises(subprocess.TimeoutExpired):
-                process.wait(0.7)  # sooner, it would be the same wish
+                process.wait(0.3)
             process.send_signal(number)
             assert process.wait(AT_ONCE_S) == 128 + number
             real(until(lambda: not of_session(process.pid), AT_ONCE_S))
