@@ -12,7 +12,10 @@ import subprocess
 import sys
 import time
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 import pytest
 from websockets.sync.client import ClientConnection, connect
@@ -97,61 +100,55 @@ def test_a_state_folder_that_cannot_be_written_is_named(flightd: Command, tmp_pa
     assert "audit.jsonl: cannot be written: Not a directory; be the user" in error
 
 
-def test_it_serves_until_ctrl_c_and_ends_in_order() -> None:
+@contextmanager
+def started(*words: str) -> Iterator[tuple[subprocess.Popen[str], IO[str]]]:
+    """A station at a port of its own, and what it says."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "flightd", "ground", "--listen", "127.0.0.1:0"],
+        [sys.executable, "-m", "flightd", "ground", "--listen", "127.0.0.1:0", *words],
         cwd=ROOT, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stderr is not None
     with process.stderr:
-        assert "the ground station is at http://127.0.0.1:" in process.stderr.readline()
+        yield process, process.stderr
+
+
+def test_it_serves_until_ctrl_c_and_ends_in_order() -> None:
+    with started() as (process, stderr):
+        assert "the ground station is at http://127.0.0.1:" in stderr.readline()
         process.send_signal(signal.SIGINT)
         assert process.wait(20) == 0
-        assert process.stderr.read() == (
+        assert stderr.read() == (
             "flightd: SIGINT: it ends in order; a second one ends it at once\n"
             "flightd: the ground station was ended by SIGINT\n"
         )
 
 
 def test_a_second_ctrl_c_ends_it_at_once_while_it_waits_for_a_page() -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "flightd", "ground", "--listen", "127.0.0.1:0"],
-        cwd=ROOT, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    assert process.stderr is not None
-    with process.stderr:
-        where = re.search(r"127\.0\.0\.1:(\d+)", process.stderr.readline())
+    with started() as (process, stderr):
+        where = re.search(r"127\.0\.0\.1:(\d+)", stderr.readline())
         assert where is not None
         with socket.create_connection(("127.0.0.1", int(where[1])), timeout=10.0) as page:
             page.sendall(b"POST /api/site/check HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n\r\n")
             process.send_signal(signal.SIGINT)
-            assert "it ends in order" in process.stderr.readline()
+            assert "it ends in order" in stderr.readline()
             process.send_signal(signal.SIGINT)
             assert process.wait(20) == 128 + signal.SIGINT
-            assert process.stderr.read() == "flightd: ended at once by SIGINT\n"
+            assert stderr.read() == "flightd: ended at once by SIGINT\n"
 
 
 def test_a_second_station_on_its_state_refuses_to_start_until_the_first_has_died(
     flightd: Command, tmp_path: Path
 ) -> None:
     words = ("--listen", "127.0.0.1:0")
-    process = subprocess.Popen(
-        [sys.executable, "-m", "flightd", "ground", *words], cwd=ROOT, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stderr is not None
-    with process.stderr:
-        assert "the ground station is at" in process.stderr.readline()
+    with started() as (process, stderr):
+        assert "the ground station is at" in stderr.readline()
         code, out, error = flightd("ground", *words)
         assert (code, out, error.count("\n")) == (2, "", 1)
         assert f"--state {tmp_path / 'state'}: another station uses it (process {process.pid})" in error
         process.kill()
         process.wait(20)
-    again = subprocess.Popen(
-        [sys.executable, "-m", "flightd", "ground", *words], cwd=ROOT, stderr=subprocess.PIPE, text=True
-    )
-    assert again.stderr is not None
-    with again.stderr:
-        assert "the ground station is at" in again.stderr.readline()
+    with started() as (again, stderr):
+        assert "the ground station is at" in stderr.readline()
         again.kill()
         again.wait(20)
 
@@ -161,14 +158,8 @@ def test_killed_in_flight_it_is_a_lost_ground_and_nothing_else() -> None:
         mission={"autostart": False, "start_countdown_s": 0.0}, ground={"lost_action": "land", "lost_s": 2.0}
     )
     with LiveFlight(load_site(ROOT / "configs" / "site-demo.toml"), config) as flight:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "flightd", "ground", "--listen", "127.0.0.1:0",
-             "--drone", "demo=127.0.0.1:{}/{}".format(*flight.ports)],
-            cwd=ROOT, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        assert process.stderr is not None
-        with process.stderr:
-            url = process.stderr.readline().split()[6]
+        with started("--drone", "demo=127.0.0.1:{}/{}".format(*flight.ports)) as (process, stderr):
+            url = stderr.readline().split()[6]
             try:
                 socket_url = url.replace("http", "ws") + "/live"
                 with connect(
