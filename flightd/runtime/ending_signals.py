@@ -13,7 +13,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
-_ENDING: Final = (signal.SIGINT, signal.SIGTERM)
+ENDING: Final = (signal.SIGINT, signal.SIGTERM)
 _STDERR: Final = 2
 _CURSOR: Final = "\x1b[?25h"
 """Shows a terminal's cursor again, which a live view hides."""
@@ -34,19 +34,19 @@ def end_on_signals(
             return
         flight.cancel()
         if again_at_once:
-            for ending in _ENDING:
+            for ending in ENDING:
                 loop.remove_signal_handler(ending)
             end_at_once_on_signals()
             _say(f"{number.name}: it ends in order; a second one ends it at once")
 
-    for number in _ENDING:
+    for number in ENDING:
         loop.add_signal_handler(number, end, number)
 
 
 def end_at_once_on_signals() -> None:
     """From now on either signal ends this process, and all that it started, with 128 and its number: also
     where its loop hangs, or has ended.  Main thread only."""
-    for number in _ENDING:
+    for number in ENDING:
         signal.signal(number, _end_at_once)
 
 
@@ -86,7 +86,7 @@ def _say(text: str, after: str = "") -> None:
 @contextmanager
 def handlers_kept() -> Iterator[None]:
     """Both signals do afterwards what they did before.  Main thread only."""
-    before = [(number, signal.getsignal(number)) for number in _ENDING]
+    before = [(number, signal.getsignal(number)) for number in ENDING]
     try:
         yield
     finally:
@@ -103,6 +103,6 @@ def raised_signals(error: Callable[[signal.Signals], Exception]) -> Iterator[Non
         raise error(signal.Signals(number))
 
     with handlers_kept():
-        for number in _ENDING:
+        for number in ENDING:
             signal.signal(number, end)
         yield

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 
-_ENDING = signal.SIGINT, signal.SIGTERM
+from flightd.runtime.ending_signals import ENDING
 
 
 @contextmanager
@@ -37,7 +37,7 @@ def _put_off() -> Iterator[None]:
         yield
         return
     came: set[int] = set()
-    handlers = [(number, signal.signal(number, lambda one, _: came.add(one))) for number in _ENDING]
+    handlers = [(number, signal.signal(number, lambda one, _: came.add(one))) for number in ENDING]
     told = signal.set_wakeup_fd(-1)
     try:
         yield

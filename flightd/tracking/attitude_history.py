@@ -11,7 +11,7 @@ from flightd.core.types import Attitude
 from flightd.tracking.line_sight import Rates
 
 _RATE_NS = 20_000_000
-
+"""Rates are taken over so long before and after."""
 _HOLD_NS = 150_000_000
 
 
@@ -54,12 +54,10 @@ class AttitudeHistory:
         return self._stamps[measured - 1] if measured else 0
 
     def rates(self, stamp_ns: int) -> Rates:
-        """How fast roll, pitch and yaw turn at that time, over `_RATE_NS` before and after; 0 where it is not
-        told."""
+        """How fast roll, pitch and yaw turn at that time; 0 where it is not told."""
         here = self.at(stamp_ns) or self.newest
         first, last = self.at(stamp_ns - _RATE_NS) or here, self.at(stamp_ns + _RATE_NS) or here
-        dt_s = 0.0 if first is None or last is None else (last.stamp_ns - first.stamp_ns) * 1e-9
-        if first is None or last is None or not dt_s > 0:
+        if first is None or last is None or not (dt_s := (last.stamp_ns - first.stamp_ns) * 1e-9) > 0:
             return Rates(0.0, 0.0, 0.0)
         return Rates(
             (last.roll_rad - first.roll_rad) / dt_s,

@@ -34,6 +34,17 @@ class Lean(NamedTuple):
     roll_rad: float
     pitch_rad: float
 
+    def times(self, share: float) -> Lean:
+        return Lean(share * self.roll_rad, share * self.pitch_rad)
+
+    def plus(self, other: Lean) -> Lean:
+        return Lean(self.roll_rad + other.roll_rad, self.pitch_rad + other.pitch_rad)
+
+    def within(self, most_rad: float) -> Lean:
+        """Each of the two brought to at most that, either way."""
+        roll, pitch = (min(max(one, -most_rad), most_rad) for one in self)
+        return Lean(roll, pitch)
+
 
 LEVEL = Lean(0.0, 0.0)
 
@@ -55,8 +66,7 @@ class CarriedLean:
 
     def lead_at(self, stamp_ns: int) -> Lean:
         """The carried roll and pitch less the told ones, at or after the newest sample."""
-        roll, pitch = self._faded(stamp_ns)
-        return Lean(_bounded(roll), _bounded(pitch))
+        return self._faded(stamp_ns).within(_MOST_RAD)
 
     def take(self, sample: Attitude, *, leaps: bool = True) -> Attitude:
         """The sample with roll and pitch as they are carried on; one that is not newer than the last is told
@@ -75,8 +85,7 @@ class CarriedLean:
         last = self._last
         if last is None or self._lead == LEVEL:
             return LEVEL
-        kept = math.exp(min(last.stamp_ns - stamp_ns, 0) * 1e-9 / self._fade_s)
-        return Lean(kept * self._lead.roll_rad, kept * self._lead.pitch_rad)
+        return self._lead.times(math.exp(min(last.stamp_ns - stamp_ns, 0) * 1e-9 / self._fade_s))
 
     def _follow(self, last: Attitude, sample: Attitude, *, leaps: bool) -> None:
         dt_s = (sample.stamp_ns - last.stamp_ns) * 1e-9
@@ -93,7 +102,7 @@ class CarriedLean:
         if roll or pitch:
             self.leap = Lean(roll, pitch)
             self.leaps += 1
-            self._lead = Lean(lead.roll_rad - roll, lead.pitch_rad - pitch)
+            self._lead = lead.plus(self.leap.times(-1.0))
 
 
 class Turn(NamedTuple):
@@ -183,7 +192,3 @@ class _Gyro:
         share = min(_MOST_TURNED_RAD2 / turned, 1.0) if turned else 1.0
         self._turned_rad2, self._unexplained_rad2 = share * turned, share * unexplained
         self._told_rad = self._felt_rad = self._window_s = 0.0
-
-
-def _bounded(lead_rad: float) -> float:
-    return min(max(lead_rad, -_MOST_RAD), _MOST_RAD)

@@ -32,28 +32,17 @@ class ToldLevel:
 
     def leaps(self, stamp_ns: int, leap: Lean) -> None:
         """In the air the told roll and pitch leap by so much."""
-        before = _fading(self._leapt, self._left(stamp_ns, self._leapt_ns))
+        before = self._leapt.times(self._left(stamp_ns, self._leapt_ns))
         share = 1.0 / (2.0 - self._left(stamp_ns, self._stood_ns) ** 2)
-        self._leapt_ns = stamp_ns
-        self._leapt = Lean(*(at + share * by for at, by in zip(before, leap, strict=True)))
+        self._leapt_ns, self._leapt = stamp_ns, before.plus(leap.times(share))
 
-    def at(self, now_ns: int) -> tuple[float, float]:
+    def at(self, now_ns: int) -> Lean:
         """Roll and pitch, rad."""
-        stood, leapt = _fading(self._stood, self._left(now_ns, self._stood_ns)), self.by_leaps(now_ns)
-        return stood.roll_rad + leapt.roll_rad, stood.pitch_rad + leapt.pitch_rad
+        return self._stood.times(self._left(now_ns, self._stood_ns)).plus(self.by_leaps(now_ns))
 
     def by_leaps(self, now_ns: int) -> Lean:
         """What of it leaps have made."""
-        leapt = _fading(self._leapt, self._left(now_ns, self._leapt_ns))
-        return Lean(_bounded(leapt.roll_rad), _bounded(leapt.pitch_rad))
+        return self._leapt.times(self._left(now_ns, self._leapt_ns)).within(_MOST_RAD)
 
     def _left(self, now_ns: int, since_ns: int) -> float:
         return math.exp(-max(now_ns - since_ns, 0) * 1e-9 / self._fade_s)
-
-
-def _fading(lean: Lean, left: float) -> Lean:
-    return Lean(left * lean.roll_rad, left * lean.pitch_rad)
-
-
-def _bounded(lean_rad: float) -> float:
-    return min(max(lean_rad, -_MOST_RAD), _MOST_RAD)

@@ -24,7 +24,7 @@ from flightd.app.simulation.flown_code import flown_code
 from flightd.app.simulation.judgement import judge_flight
 from flightd.app.simulation.launch import fly
 from flightd.app.simulation.prepare import SimOptions, prepare
-from flightd.app.simulation.sweep_routes import ACROSS, ALONG, ROUTES, SweepRoute
+from flightd.app.simulation.sweep_routes import ACROSS, ALONG, SweepRoute, route_by_seed
 from flightd.cli.scenario_sweep import faults_in_words
 from flightd.core.errors import RunError
 from flightd.sim.judge.flight_score import FlightScore
@@ -121,14 +121,10 @@ class FlownPair:
         return f"{self.seed}: {self.faults}: {self.ended}: {words}"
 
 
-def pair_route(seed: int) -> SweepRoute:
-    return ROUTES[1 - seed % 2]
-
-
 def draw_pair(seed: int) -> Scenario:
     """Two different kinds of fault, each for good or for a while, or at a place."""
     draw = random.Random(seed)
-    nodes = PASSED[pair_route(seed)]
+    nodes = PASSED[route_by_seed(seed)]
     faults = []
     for make in draw.sample(_KINDS, 2):
         lasts_s = math.inf if draw.random() < 0.5 else round(draw.uniform(*_LASTS_S), 2)
@@ -143,7 +139,7 @@ def fly_pair(seed: int, folder: Path, vehicle: str) -> FlownPair:
     scenario = draw_pair(seed)
     # one that waits on its pad for a fresh battery waits for ever
     options = SimOptions(seed=seed, vehicle=vehicle, settings=["battery.swap=false"])
-    simulation = prepare(options, scenario, folder, lambda _: None, sweep_route=pair_route(seed).setting)
+    simulation = prepare(options, scenario, folder, lambda _: None, sweep_route=route_by_seed(seed).setting)
     ended = ""
     try:
         fly(simulation)
