@@ -12,6 +12,8 @@ LEAP_RAD, _OFTEN_S, _STAMPS_S = math.radians(1.0), 0.02, 0.02
 """A told roll or pitch that turns by more than this between two samples, in longer than `_OFTEN_S` by as much
 more, and by more than the rate turns it in `_STAMPS_S`, by which stamps may be wrong, while the gyros felt
 none of it, leaps: the autopilot takes another estimator's, or its own anew."""
+_LEAST_RAD = 0.5 * LEAP_RAD
+"""What leaps back leaps by this at least; less, that has all but faded, is taken back without being told."""
 GAP_S = 0.06
 """Over longer ones two rates do not tell what was turned between them."""
 _NOISE_S, _SIGMAS = 1.0, 5.0
@@ -101,7 +103,7 @@ class CarriedLean:
         pitch = self._pitch.step(stamp_ns, Turn(told[1], pitch_rates, dt_s), lead.pitch_rad, leaps=leaps)
         if roll or pitch:
             self.leap = Lean(roll, pitch)
-            self.leaps += 1
+            self.leaps += max(abs(roll), abs(pitch)) >= _LEAST_RAD
             self._lead = lead.plus(self.leap.times(-1.0))
 
 
@@ -151,8 +153,7 @@ class _Gyro:
         before_rad, self._leapt_rad = self._leapt_rad, 0.0
         if not turn.is_felt:
             return 0.0
-        least_rad = 0.5 * LEAP_RAD
-        if abs(turn.apart_rad - lead_rad) < least_rad < min(abs(turn.apart_rad), abs(lead_rad)):
+        if abs(turn.apart_rad - lead_rad) < _LEAST_RAD < min(abs(turn.apart_rad), abs(lead_rad)):
             return lead_rad
         most_rad, apart_rad = max(turn.most_apart_rad, _SIGMAS * math.sqrt(self._noise_rad2)), turn.apart_rad
         is_turn = abs(apart_rad) <= most_rad

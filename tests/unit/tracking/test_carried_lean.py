@@ -214,6 +214,18 @@ def test_a_lead_does_not_outlive_the_proof_of_the_gyros() -> None:
     assert wrong_s < 0.5
 
 
+def test_what_is_left_of_a_lead_that_has_faded_is_no_leap_when_the_proof_is_lost() -> None:
+    died_s = 30.0
+    lean, _ = carried(
+        lambda at_s: leaps(at_s) * math.exp((LEAP_S - at_s) / FADE_S),
+        lambda at_s, rate: rate if at_s < died_s else 0.0,
+        until_s=40.0,
+        swing_rad=math.radians(2.0),
+    )
+    assert lean.lead_at(0) == LEVEL
+    assert lean.leaps == 1
+
+
 @pytest.mark.parametrize("late_s", [0.005, 0.01])
 def test_stamps_that_are_wrong_make_no_leaps_of_turns(late_s: float) -> None:
     noise = random.Random(1)
