@@ -37,6 +37,8 @@ _REST_MPS = 0.15
 # the autopilots themselves say after a second that they stand
 _OWN_LANDING_S, _DISARM_S = 2.5, 5.5
 """Down and still for so long: have the autopilot land by itself, ask it to disarm."""
+_RISES_MPS = 0.2
+"""One that takes its climb for so much less than it is lands by itself too slowly, or rises off the floor."""
 _HURRY, _HURRY_ACCEL = 4.0 / 3.0, 2.0
 """How much faster than usual a take-off out of sight climbs, within the limits, and how much harder."""
 _BEYOND_M = 0.05
@@ -234,9 +236,8 @@ class ReferenceGenerator:
         standing = v is not None and v.landed is LandedState.ON_GROUND and not deaf
         standing = standing or self._still_s > _DISARM_S
         self._stood |= standing  # from then on nothing takes it out of its own landing any more
-        by_itself = (
-            deaf or task.state.adopted or self._by_itself or self._stood or self._still_s > _OWN_LANDING_S
-        )
+        rests = self._still_s > _OWN_LANDING_S and s.warnings.climb_error_mps > -_RISES_MPS
+        by_itself = deaf or task.state.adopted or self._by_itself or self._stood or rests
         return -rate, Demand.DISARM if standing else Demand.LAND if by_itself else Demand.FLY
 
     def _steer(self, s: MissionInputs, task: ReferenceTask) -> bool:

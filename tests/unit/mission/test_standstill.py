@@ -9,9 +9,11 @@ from dataclasses import replace
 import pytest
 
 from flightd.config.mission import MissionConfig
-from flightd.core.types import Attitude, AttitudeSetpoint, LandedState, VehicleState
+from flightd.core.types import Attitude, AttitudeSetpoint, Demand, LandedState, Phase, VehicleState
 from flightd.mission.flight.touchdown import ReckonedHeight, Standstill, UnheardDescent
 from flightd.mission.guidance import MissionInputs, Warnings
+from flightd.mission.machine import Intent, State
+from tests.unit.mission.states import fresh
 
 TICK_NS = 20_000_000
 PARAMS = MissionConfig(site="site-demo.toml")
@@ -112,6 +114,23 @@ def test_what_stands_and_tells_a_climb_that_is_known_to_be_wrong_stands() -> Non
         still_s = stands.step(replace(told(tick, 0.1, -0.8), warnings=misled), sinks=True)
     assert stands.touches
     assert still_s > 1.0
+
+
+@pytest.mark.parametrize(("error_mps", "lands_itself"), [(0.0, True), (0.8, True), (-0.8, False)])
+def test_what_would_rise_by_itself_off_the_floor_is_not_asked_to_land_by_itself(
+    error_mps: float, lands_itself: bool
+) -> None:
+    flight = fresh(State(Phase.FOLLOW, Intent.VISIT))
+    flight.set(landed=LandedState.IN_AIR, warnings=Warnings(climb_wrong=True, climb_error_mps=error_mps))
+    flight.run(0.02, follow=False)
+    assert flight.phase is Phase.LAND
+    flight.set(height_m=0.1, climb_mps=error_mps)
+    demands = []
+    for _ in range(round(6.0 * 50)):
+        flight.run(0.02, follow=False)
+        demands.append(flight.demand)
+    assert demands[-1] is Demand.DISARM
+    assert (Demand.LAND in demands) == lands_itself
 
 
 @pytest.mark.parametrize(("rises_mps", "height_m"), [(0.5, 0.1), (0.2, 0.1), (0.5, float("nan"))])
