@@ -137,6 +137,15 @@ def test_once_contradicted_a_width_is_not_taken_for_being_nearer_to_what_is_wron
         assert heights.sees([1.6, 1.45 - 0.01 * n], 0.9) == 1.6
 
 
+def test_a_scratch_that_agrees_with_what_leapt_away_from_the_lines_does_not_put_it_right() -> None:
+    heights = Frames()
+    for n in range(60):
+        heights.sees([1.6], 1.6 if n < 30 else 5.8)
+    for n in range(60):
+        assert heights.sees([1.6, 1.7, 5.4] if n % 3 < 2 else [1.6], 5.8) == pytest.approx(1.6, abs=0.2)
+    assert heights.sees([1.6, 5.4], 1.6) == 1.6, "right again, by the lines that were followed"
+
+
 def test_widths_that_never_agreed_contradict_a_height_that_is_always_the_same_share_of_theirs() -> None:
     heights = Frames()
     for n in range(40):
