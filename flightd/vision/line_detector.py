@@ -36,6 +36,7 @@ _KEPT_BYTES = 1 << 24
 """More than any small picture, less than the 32 MB from which the C library always goes to the system."""
 _SPECKS = np.ones((5, 5), np.uint8)
 _HOLES = np.ones((9, 9), np.uint8)
+_ALONG = np.ones((1, 9), np.uint8)
 _WORN = 1.02
 """Closing that adds more than this to the paint shows worn paint, whose holes would break the ridge."""
 
@@ -191,11 +192,13 @@ def _weighed(bands: list[Band], mask: Image, grid: Grid, plane: Plane) -> list[e
 
 def _closed(mask: Image, kernel: Image) -> Image:
     """The mask with its small gaps filled.  What lies outside the picture is unknown: the floor between a
-    band and the border it runs along is no gap, and does not make of the band one that the border cuts."""
+    band and the border it runs along is no gap, and does not make of the band one that the border cuts; along
+    the border, where it cuts one, a gap is none either, and does not make of it one that ends before."""
     closed = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, kernel), np.uint8)
     rows, columns = (max(side - 1, 1) for side in mask.shape)
-    closed[::rows] &= mask[::rows]
-    closed[:, ::columns] &= mask[:, ::columns]
+    across, along = np.ascontiguousarray(mask[::rows]), np.ascontiguousarray(mask[:, ::columns])
+    closed[::rows] &= np.asarray(cv2.morphologyEx(across, cv2.MORPH_CLOSE, _ALONG), np.uint8)
+    closed[:, ::columns] &= np.asarray(cv2.morphologyEx(along, cv2.MORPH_CLOSE, _ALONG.T), np.uint8)
     return closed
 
 

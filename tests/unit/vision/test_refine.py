@@ -85,6 +85,18 @@ def test_a_line_beside_a_little_floor_at_the_border_is_one(
     assert abs(turn) < 3e-3
 
 
+@pytest.mark.parametrize("theta", [0.03, 0.06, -0.03])
+@pytest.mark.parametrize("beyond_px", [4.0, 10.0])
+def test_goods_that_the_border_cuts_are_no_line_along_it(beyond_px: float, theta: float) -> None:
+    """Boards of a pallet at the foot of a shelf, of about the paint's colour."""
+    x, y = grid(640, 360)
+    covered = coverage([Band(320.0 + beyond_px, theta, 60.0)], x, y)[..., None]
+    wood = np.array((62, 82, 98)) * np.where((y + 200) % 34 < 5, 0.35, 1.0)[..., None]
+    shown = np.array((118, 118, 120)) * (1 - covered) + wood * covered
+    for seed in range(3):
+        assert Detector().detect(photographed(shown, seed, 6.0)).lines == ()
+
+
 @pytest.mark.parametrize("blur_px", [5, 13, 25])
 def test_a_black_line_blurred_by_motion_is_no_shadow(blur_px: int) -> None:
     band = Band(20.0, 0.0, 50.0)
