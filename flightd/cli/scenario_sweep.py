@@ -27,7 +27,7 @@ from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.summary import Summary, write_results
 from flightd.app.simulation.sweep_log import SweepLog, SweptRow
 from flightd.cli.flight_progress import FlightProgress
-from flightd.core.errors import RunError
+from flightd.core.errors import InputError, RunError
 
 _T = TypeVar("_T")
 
@@ -65,7 +65,7 @@ def sweep(
 
 def fly_seeds(simulations: Iterable[Simulation], *, as_json: bool) -> None:
     """Fly each and print how it went, also where a signal ends it: exit code 128 and the signal's number.
-    RunError where the judge calls one bad."""
+    What goes wrong with one flight is its row's error.  RunError where one failed or is called bad."""
     summaries: list[Summary] = []
     interrupted = _until_interrupted(_each_flown(simulations, shown=not as_json), summaries)
     bad = [summary["seed"] for summary in summaries if summary["verdict"] != "good"]
@@ -83,9 +83,15 @@ def _each_flown(simulations: Iterable[Simulation], *, shown: bool) -> Iterator[S
     for simulation in simulations:
         print(f"flightd: seed {simulation.seed}", file=sys.stderr, flush=True)
         started = time.monotonic()
-        with FlightProgress(shown=shown) as progress:
-            result = fly(replace(simulation, observer=progress))
-        yield write_results(simulation, result, time.monotonic() - started)
+        try:
+            with FlightProgress(shown=shown) as progress:
+                result = fly(replace(simulation, observer=progress))
+            summary = write_results(simulation, result, time.monotonic() - started)
+        except FlightInterruptedError:
+            raise
+        except (RunError, InputError) as err:  # it failed, or what it recorded cannot be read
+            summary = {"seed": simulation.seed, "verdict": "not judged", "error": str(err)}
+        yield summary
 
 
 def _until_interrupted(flights: Iterator[_T], flown: list[_T]) -> FlightInterruptedError | None:
@@ -150,6 +156,10 @@ def _print_seeds(summaries: Sequence[Summary]) -> None:
     for heading in ("seed", "mission", "visited", "off leg, rms", "clearance", "verdict"):
         table.add_column(heading)
     for summary in summaries:
+        if "error" in summary:
+            verdict = f"{summary['verdict']}: {summary['error']}"
+            table.add_row(str(summary["seed"]), *["-"] * 4, verdict)
+            continue
         table.add_row(
             str(summary["seed"]),
             f"{summary['mission']}: {summary['reason']}",

@@ -211,23 +211,50 @@ def test_a_file_that_is_no_such_list_is_refused(flights: Flights, sim: Run, tmp_
     assert "sweep.jsonl: is no list of a sweep's flights" in err
 
 
-def test_a_signal_ends_the_flights_of_many_seeds_too(
-    sim: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+@pytest.fixture
+def seeds(monkeypatch: pytest.MonkeyPatch) -> dict[int, FlightdError]:
+    """Flights of many seeds that only pretend; those in it raise, in the air (RunError) or judged."""
+    raising = dict[int, FlightdError]()
     summary = {
         "mission": "completed", "reason": "", "nodes_visited": 1, "nodes_planned": 1, "faults": [],
         "cross_track_rms_m": 0.1, "min_clearance_m": 1.0, "verdict": "good",
     }  # fmt: skip
 
     def fly(simulation: Simulation) -> object:
-        if simulation.seed == 2:
-            raise FlightInterruptedError(signal.SIGTERM, None)
+        if isinstance(error := raising.get(simulation.seed), RunError):
+            raise error
         return object()
 
+    def judge(simulation: Simulation, *_: object) -> dict[str, Any]:
+        if error := raising.get(simulation.seed):
+            raise error
+        return {**summary, "seed": simulation.seed}
+
     monkeypatch.setattr("flightd.cli.scenario_sweep.fly", fly)
-    monkeypatch.setattr(
-        "flightd.cli.scenario_sweep.write_results", lambda flight, *_: {**summary, "seed": flight.seed}
-    )
+    monkeypatch.setattr("flightd.cli.scenario_sweep.write_results", judge)
+    return raising
+
+
+def test_a_seed_whose_flight_fails_is_a_row_and_the_others_fly_on(
+    seeds: dict[int, FlightdError], sim: Run
+) -> None:
+    seeds |= {1: RunError("no end"), 3: InputError("no log")}
+    code, out, err = sim("--seeds", "4", "--json")
+    assert code == 1
+    told = json.loads(out)
+    assert [(row["seed"], row["verdict"], row.get("error")) for row in told["flights"]] == [
+        (1, "not judged", "no end"), (2, "good", None), (3, "not judged", "no log"), (4, "good", None),
+    ]  # fmt: skip
+    assert told["bad"] == [1, 3]
+    assert "2 of 4 flights are bad: seeds 1, 3" in err
+    code, out, _ = sim("--seeds", "4")
+    assert code == 1
+    assert "not judged: no end" in out
+    assert "1 of 1" in out
+
+
+def test_a_signal_ends_the_flights_of_many_seeds_too(seeds: dict[int, FlightdError], sim: Run) -> None:
+    seeds[2] = FlightInterruptedError(signal.SIGTERM, None)
     code, out, err = sim("--seeds", "3", "--json")
     assert code == 128 + signal.SIGTERM
     told = json.loads(out)
