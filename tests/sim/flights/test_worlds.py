@@ -34,3 +34,13 @@ def test_flights_by_computed_sight_tell_nothing_that_nobody_judged(
     assert not {"safe", "miscounted"} & set(summary.replace(",", "").split())
     (row,) = json.loads(rows.read_text())
     assert (row["completed"], row["unsafe"], row["miscounted"]) == (True, None, None)
+
+
+def test_vehicle_and_settings_are_those_of_the_flight(capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = ["--set", "vehicle.pose_output=sideways"]
+    assert main(["--world", "ideal", "--seeds", "1", "--vehicle", "px4", *wrong]) == 1
+    assert "vehicle.pose_output" in capsys.readouterr().out
+    assert main(["--world", "ideal", "--seeds", "1", "--vehicle", "balloon"]) == 1
+    assert "vehicle.kind" in capsys.readouterr().out
+    with pytest.raises(SystemExit, match="2"):
+        main(["--ideal", "--vehicle", "px4"])

@@ -3,8 +3,9 @@
 python -m tests.sim.flights.worlds --world rough --seeds 7101-7140 flies each seed as `flightd sim` does (with
 `--ideal`: by computed sight, without pictures and sockets, at a tenth of the work, and judged by nobody) and
 prints a line for each and one for all; exit 1 where a flight was not completed, not safe, or could not be
-judged.  `--nodes A2,A3` flies a short route,
-`--nodes 3` the first three of the site's own; `--warehouse random` is a random site by each flight's seed.
+judged.  Each flies its site's whole route: that is what figures of a world are flown by.  `--nodes A2,A3` is
+a short look, `--nodes 3` flies to the first three; `--warehouse random` is a random site by each flight's seed.
+`--vehicle px4` and `--set KEY=VALUE` (`--set vehicle.pose_output=none`) are those of `flightd sim`.
 `--off-ms=-50,60` configures a camera's delay of 60 ms wrong by so much; `--json FILE` keeps what was found.
 """
 
@@ -66,6 +67,8 @@ class PlannedFlight:
     off_ms: int | None = None
     ideal: bool = False
     """By computed sight."""
+    vehicle: str | None = None
+    settings: tuple[str, ...] = ()
 
     def site(self) -> Site:
         if self.warehouse is None:
@@ -157,8 +160,9 @@ def _flown_by_pictures(planned: PlannedFlight) -> Result:
         seed=planned.seed,
         world=planned.world,
         warehouse=planned.warehouse,
+        vehicle=planned.vehicle,
         plant=planned.plant,
-        settings=settings,
+        settings=[*settings, *planned.settings],
     )
     probe, ended = _SensorProbe(), ""
     with tempfile.TemporaryDirectory() as folder:
@@ -302,9 +306,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--world", type=WorldKind, default=WorldKind.ROUGH)
     parser.add_argument("--seeds", default="7101-7110", help="FIRST-LAST")
-    parser.add_argument("--nodes", default="A2,A3", help="route, or so many of the site's; empty: all nodes")
+    parser.add_argument("--nodes", default="", help="route, or so many of the site's; default: all nodes")
     parser.add_argument(
         "--warehouse", help="random (by each flight's seed) or random:SEED; else the demo site"
+    )
+    parser.add_argument("--vehicle", help="ardupilot (default), px4, ardrone or mavsdk")
+    parser.add_argument(
+        "--set", dest="settings", action="append", default=[], help="KEY=VALUE over the configuration"
     )
     parser.add_argument("--plant", type=PlantKind, default=PlantKind.OWN)
     parser.add_argument("--off-ms", help="configured delays less the true one, with commas between them")
@@ -314,6 +322,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.ideal and (given.off_ms or given.plant is not PlantKind.OWN):
         parser.error("--ideal flies our own airframe, its delay as the world draws it")
+    if given.ideal and (given.vehicle or given.settings):
+        parser.error("--ideal flies no adapter, by the simulator's own configuration")
     first, _, last = given.seeds.partition("-")
     offs = [int(off) for off in given.off_ms.split(",")] if given.off_ms else [None]
     each = [
@@ -325,6 +335,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             given.plant,
             off_ms,
             given.ideal,
+            given.vehicle,
+            tuple(given.settings),
         )
         for off_ms in offs
         for seed in range(int(first), int(last or first) + 1)
