@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightd.cli.map.site_files import Force, write_new
+from flightd.cli.map.site_files import Force, demand_new, write_new
 from flightd.cli.options import AsJson
 from flightd.core.errors import InputError
 
@@ -59,13 +59,15 @@ def fit(
     from flightd.studies.map_fit_document import fit_document, lines_off
 
     distances = [_distance(text) for text in measured or ()]
+    if out is not None:
+        demand_new((out, _drawing_of(out)), force)
     records, configs, site = _flown(logs)
     text = site_toml(site) if site_file is None else _text_of(site_file, site)
     found = fit_map(records, configs, site, distances)
     document = {"logs": [str(log) for log in logs], **fit_document(found)}
     if out is not None:
         write_new(out, with_aisles(text, found.aisles), force)
-        drawing = out.with_suffix(".svg")
+        drawing = _drawing_of(out)
         write_new(drawing, draw_site(site, lines_off(found, site)), force)
         document |= {"site": str(out), "drawing": str(drawing)}
     if as_json:
@@ -73,9 +75,11 @@ def fit(
         return
     _print(found)
     if out is not None:
-        print(
-            f"{out}: the proposed map; {out.with_suffix('.svg')}: where the lines lie, ten times exaggerated"
-        )
+        print(f"{out}: the proposed map; {_drawing_of(out)}: where the lines lie, ten times exaggerated")
+
+
+def _drawing_of(out: Path) -> Path:
+    return out.parent / f"{out.stem}.svg"
 
 
 def _flown(logs: list[Path]) -> tuple[list[FlightRecord], list[Config], Site]:

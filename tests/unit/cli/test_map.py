@@ -211,3 +211,20 @@ def test_what_is_no_map_of_anybody_is_refused(
     assert err.startswith(f"flightd: {tmp_path / name}: ")
     assert words in err
     assert not (tmp_path / "s.toml").exists()
+
+
+def test_fit_refuses_names_that_it_cannot_write_before_it_fits(flightd: Command, tmp_path: Path) -> None:
+    log = tmp_path / "none.mcap"  # names come first, so that nobody waits for a fit that cannot be kept
+    out = tmp_path / "hall.svg"
+    for more in ((), ("--force",)):
+        code, _, err = flightd("map", "fit", log, "--out", out, *more)
+        assert (code, err) == (
+            2,
+            f"flightd: {out}: would be written twice; choose a name that ends otherwise\n",
+        )
+    out.write_text("a drawing")
+    code, _, err = flightd("map", "fit", log, "--out", tmp_path / "hall.toml")
+    assert (code, f"{out}: there already" in err) == (2, True)
+    assert [file.name for file in tmp_path.iterdir()] == ["hall.svg"]
+    code, _, err = flightd("map", "fit", log, "--out", tmp_path, "--force")
+    assert (code, f"{tmp_path}: cannot write: it is a folder" in err) == (2, True)
