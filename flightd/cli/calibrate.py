@@ -29,6 +29,9 @@ A flight tells the camera's delay and mount, too: best one that hovers, goes fas
 """
 
 
+_CHESSBOARD = "9x6"
+
+
 def register(app: typer.Typer) -> None:
     """Hang the command under `app`."""
     app.command("calibrate", epilog=EXAMPLES)(calibrate)
@@ -38,7 +41,9 @@ def calibrate(
     paths: Annotated[
         list[Path] | None, typer.Argument(metavar="PATH…", help="Images, folders of them, and videos.")
     ] = None,
-    board: Annotated[str, typer.Option(help="Inner corners, COLUMNSxROWS.")] = "9x6",
+    board: Annotated[
+        str | None, typer.Option(help="Inner corners, COLUMNSxROWS (default: 9x6).", show_default=False)
+    ] = None,
     charuco: Annotated[
         str,
         typer.Option(
@@ -55,10 +60,12 @@ def calibrate(
 
     if bool(paths or charuco) is (from_log is not None):
         raise InputError("give pictures of a board, or --from-log LOG")
+    if from_log is not None and board is not None:
+        raise InputError("a flight shows no board", key="--board", remedy="leave it out, or --from-log")
     if from_log is not None:
         _by_flight(from_log, as_json=as_json)
         return
-    found = calibrate_lens(paths or [], _board(board, charuco))
+    found = calibrate_lens(paths or [], _board(board or _CHESSBOARD, charuco))
     if as_json:
         print(json.dumps(found.document(), indent=2))
         return

@@ -52,7 +52,7 @@ def sensor_rows(found: FittedSensors, camera: CameraConfig, online: SensorEstima
     ) -> SensorRow:
         told = one in found.told
         sure = told and bool(key) and abs(add) > _SURE_SIGMAS * sigma
-        by_flight = seen if known else None
+        by_flight = seen if known and seen is not None and all(map(math.isfinite, seen)) else None
         return SensorRow(
             name,
             unit,
@@ -193,11 +193,11 @@ def keys_to_set(rows: list[SensorRow], camera: CameraConfig) -> dict[str, float 
 
 
 def sensors_document(found: FittedSensors, rows: list[SensorRow], camera: CameraConfig) -> dict[str, Any]:
-    """As JSON has it."""
+    """As JSON has it: null for what is not known."""
     return {
         "frames": found.frames,
         "turned_deg": round(math.degrees(found.turned_rad), 1),
-        "misfit": round(found.misfit, 3),
+        "misfit": round(found.misfit, 3) if math.isfinite(found.misfit) else None,
         "sensors": [
             {
                 name: round(value, 5) if isinstance(value, float) else value

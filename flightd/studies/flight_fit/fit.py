@@ -25,6 +25,8 @@ _STEPS = 3
 """Of Gauss and Newton in each round."""
 _BREAK_S = 0.2
 """Frames farther apart are not linked."""
+_LEAST_FRAMES = 50
+"""In each flight, with a line of the map in them: by fewer no sensor is told better than it was believed."""
 _SHAKE_RAD = np.radians([0.15, 0.15, 0.1])
 _LEAST_SHAKE_RAD = math.radians(0.02)
 
@@ -86,6 +88,7 @@ def fit_flights(
             one.sights = associate(
                 one.frames, site, one.believed_lens(), one.believed_mount(), one.poses(), offset_m, gate_m
             )
+            _demand_lines(one)
         for _ in range(_STEPS):
             try:
                 step, covariance, squares = _step(flights, lines, offset_m, angle_rad, belief, sensor_sigmas)
@@ -95,6 +98,18 @@ def fit_flights(
     sightings = np.sum([one.sights.counted(len(offset_m)) for one in flights], axis=0)
     misfit = math.sqrt(float(np.median(squares)) / _MEDIAN_SQUARE) if len(squares) else math.nan
     return Fit(tuple(flights), offset_m, angle_rad, covariance, sightings, misfit)
+
+
+def _demand_lines(flight: FlightState) -> None:
+    """RunError where hardly a line of the map was found in a flight."""
+    known, frames = len(np.unique(flight.sights.frame)), len(flight.frames)
+    if known < _LEAST_FRAMES:
+        raise RunError(
+            f"lines of the map are where they should be in {known} of {frames} frames, "
+            f"{_LEAST_FRAMES} are needed",
+            file=flight.record.path,
+            remedy="check line_width_m of the site and where the drone thought it was (flightd report)",
+        )
 
 
 _MEDIAN_SQUARE = 2.0 * math.log(2.0)

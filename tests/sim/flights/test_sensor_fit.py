@@ -49,6 +49,8 @@ def test_pictures_or_a_log_not_both(flightd: Command, tmp_path: Path) -> None:
     for given in ((), ("board.jpg", "--from-log", log)):
         code, _, err = flightd("calibrate", *given)
         assert (code, err) == (2, "flightd: give pictures of a board, or --from-log LOG\n")
+    code, _, err = flightd("calibrate", "--from-log", log, "--board", "9x6")
+    assert (code, err) == (2, "flightd: --board: a flight shows no board; leave it out, or --from-log\n")
     log.write_bytes(b"")
     code, _, err = flightd("calibrate", "--from-log", log)
     assert (code, "the file is empty" in err) == (2, True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,3 +72,12 @@ def test_the_flight_s_own_estimate_stands_beside_it() -> None:
     assert delay.online == pytest.approx(0.05)
     assert delay.fitted == pytest.approx(0.048)
     assert sensors_document(found, rows, CAMERA)["sensors"][0]["online"] == 0.05
+
+
+def test_what_is_not_known_is_null_in_json() -> None:
+    half = SensorEstimate(delay_s=0.01, delay_sigma_s=0.002)  # as a log of before the mount's yaw was learnt
+    found = replace(fitted(), misfit=math.nan)
+    document = sensors_document(found, sensor_rows(found, CAMERA, half), CAMERA)
+    json.dumps(document, allow_nan=False)
+    told = {row["name"]: row["online"] for row in document["sensors"]}
+    assert (told["camera delay"], told["mount yaw"], document["misfit"]) == (0.05, None, None)

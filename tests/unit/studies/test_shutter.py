@@ -8,8 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from flightd.config.schema import Config, load_config
+from flightd.core.errors import RunError
 from flightd.core.geometry import GRAVITY_MPS2, Mount
 from flightd.core.tracks import NOT_SEEN
 from flightd.core.types import LineSet
@@ -19,6 +21,7 @@ from flightd.site.painted_lines import PaintMap
 from flightd.studies.flight_fit.fit import LineBelief, fit_flights
 from flightd.studies.flight_fit.motion import BELIEVED, Sensor
 from flightd.studies.flight_fit.record import FlightRecord, Series
+from flightd.studies.sensor_fit import fit_sensors
 from flightd.tracking.rolling_shutter import ImageMotion, as_of_one_moment
 from tests.sim.ideal.ideal_sight import EyeErrors, IdealEye
 
@@ -95,3 +98,11 @@ def test_rows_exposed_one_after_the_other_are_taken_for_what_they_are() -> None:
     assert as_exposed < 0.2 * as_if_at_once
     assert math.degrees(off_rad) > 0.2
     assert math.degrees(left_rad) < 0.05
+
+
+def test_a_flight_in_which_no_line_is_one_of_the_map_is_refused() -> None:
+    painted_wider = replace(SITE, line_width_m=4.0 * SITE.line_width_m)
+    with pytest.raises(
+        RunError, match=r"^made\.mcap: lines of the map .* in 0 of 200 frames, 50 are needed; "
+    ):
+        fit_sensors(flown(), config(READOUT_S), painted_wider)
