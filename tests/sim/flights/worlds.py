@@ -4,7 +4,7 @@ python -m tests.sim.flights.worlds --world rough --seeds 7101-7140 flies each se
 `--ideal`: by computed sight, without pictures and sockets, at a tenth of the work, and judged by nobody) and
 prints a line for each and one for all; exit 1 where a flight was not completed, not safe, or could not be
 judged.  Each flies its site's whole route: that is what figures of a world are flown by.  `--nodes A2,A3` is
-a short look, `--nodes 3` flies to the first three; `--warehouse random` is a random site by each flight's seed.
+a short look, `--nodes 3` flies to the first three; `--warehouse random` is a random site by each seed.
 `--vehicle px4` and `--set KEY=VALUE` (`--set vehicle.pose_output=none`) are those of `flightd sim`.
 `--off-ms=-50,60` configures a camera's delay of 60 ms wrong by so much; `--json FILE` keeps what was found.
 """
