@@ -64,7 +64,8 @@ async def _watched(config: Config, clock: Clock, detector: Detector, seconds: fl
     vehicle = connect_vehicle(config.vehicle, clock, config.control)
     frames: Latest[FrameTicket] = Latest()
     camera = connect_camera(config.camera, clock, frames.put, lambda _: None, vehicle)
-    followed, attitudes = FollowedLines(config.camera.lens().fx_px), list[Attitude]()
+    followed = FollowedLines(config.camera.lens(), config.camera.readout_s)
+    attitudes = list[Attitude]()
 
     async def look() -> None:
         while True:

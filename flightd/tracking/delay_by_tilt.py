@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightd.core.geometry import wrap_half_pi
+from flightd.core.geometry import Lens, wrap_half_pi
 from flightd.core.types import Attitude, Line
 
 Floats = NDArray[np.float64]
@@ -53,17 +53,19 @@ class DelayByTilt:
 
 @dataclass(frozen=True, slots=True)
 class SeenLine:
-    """The place of a line in a frame: offset from the principal point along its normal, in focal lengths."""
+    """The place of a line in a frame: offset from the principal point along its normal, in focal lengths.
+    `stamp_ns` is the frame's, later or earlier by when the row was exposed that it was seen in."""
 
     stamp_ns: int
     offset: float
 
 
 class FollowedLines:
-    """Follows the steadiest line of each direction from frame to frame; `runs` are what stayed one line."""
+    """Follows the steadiest line of each direction from frame to frame; `runs` are what stayed one line.
+    Within `readout_s` the rows of a frame are exposed, from top to bottom, about the frame's stamp."""
 
-    def __init__(self, focal_px: float) -> None:
-        self._focal_px = focal_px
+    def __init__(self, lens: Lens, readout_s: float = 0.0) -> None:
+        self._focal_px, self._height_px, self._readout_s = lens.fx_px, lens.height_px, readout_s
         self._runs: list[list[SeenLine]] = []
         self._open: dict[bool, tuple[float, list[SeenLine]]] = {}
 
@@ -75,13 +77,20 @@ class FollowedLines:
             chosen = self._going_on(open_run, stamp_ns, near) if open_run else None
             if chosen is not None and open_run is not None:
                 theta_rad, offset = chosen
-                open_run[1].append(SeenLine(stamp_ns, offset))
+                open_run[1].append(SeenLine(stamp_ns + self._late_ns(offset, theta_rad), offset))
                 self._open[is_vertical] = theta_rad, open_run[1]
             elif near and (open_run is None or self._is_over(open_run[1], stamp_ns)):
                 best = max(near, key=lambda line: line.support * (line.end_px - line.start_px))
-                run = [SeenLine(stamp_ns, best.rho_px / self._focal_px)]
+                offset = best.rho_px / self._focal_px
+                run = [SeenLine(stamp_ns + self._late_ns(offset, best.theta_rad), offset)]
                 self._runs.append(run)
                 self._open[is_vertical] = best.theta_rad, run
+
+    def _late_ns(self, offset: float, theta_rad: float) -> int:
+        """By how much later than the middle row that of the foot of the line's normal was exposed: the motion
+        bends a line about where it is as the foot's row has it."""
+        row = offset * self._focal_px * math.sin(theta_rad) / self._height_px
+        return round(min(max(row, -0.5), 0.5) * self._readout_s * 1e9)
 
     def _going_on(
         self, run: tuple[float, list[SeenLine]], stamp_ns: int, lines: Sequence[Line]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from functools import partial
 
 import pytest
 from hypothesis import given, settings
@@ -20,9 +21,9 @@ SECONDS, START_S = 12.0, 100.0
 class Hand:
     """Holds a drone over two crossing lines and rocks it about its wrist, drifting as hands do."""
 
-    def __init__(self, seed: int, rocks_rad: float = math.radians(7.0)) -> None:
+    def __init__(self, seed: int, rocks_rad: float = math.radians(7.0), ahead_m: float = 0.0) -> None:
         rng = random.Random(seed)
-        self._rocks_rad = rocks_rad
+        self._rocks_rad, self._ahead_m = rocks_rad, ahead_m
         self._hz = [rng.uniform(0.5, 1.3) for _ in range(2)]
         self._phase = [rng.uniform(0.0, math.tau) for _ in range(2)]
         self._drift = [rng.uniform(0.02, 0.06) for _ in range(2)]
@@ -42,20 +43,29 @@ class Hand:
         slow = [
             size * math.sin(math.tau * hz * t) for size, hz in zip(self._drift, self._slow_hz, strict=True)
         ]
-        return slow[0] - self._wrist_m * pitch, slow[1] + self._wrist_m * roll
+        return slow[0] - self._wrist_m * pitch - self._ahead_m, slow[1] + self._wrist_m * roll
 
 
-def seen_by(hand: Hand, t: float, noise_px: float, rng: random.Random, mount: Mount) -> list[Line]:
-    """The two lines as the camera has them at that time, 1.1 m up."""
-    homography = ground_homography(LENS, mount, *hand.tilt(t))
-    forward, right = hand.place(t)
+def pixel(hand: Hand, t: float, mount: Mount, place: tuple[float, float]) -> tuple[float, float]:
+    """Where a place on the floor (from the lines' crossing, m) is seen at that time, 1.1 m up."""
+    homography, (forward, right) = ground_homography(LENS, mount, *hand.tilt(t)), hand.place(t)
+    u, v, w = homography @ ((place[0] - forward) / 1.1, (place[1] - right) / 1.1, 1.0)
+    return u / w - LENS.cx_px, v / w - LENS.cy_px
+
+
+def seen_by(
+    hand: Hand, t: float, noise_px: float, rng: random.Random, mount: Mount, readout_s: float = 0.0
+) -> list[Line]:
+    """The two lines as the camera has them whose middle row is exposed then."""
     lines = []
     for direction in ((1.0, 0.0), (0.0, 1.0)):
         pixels = []
         for along in (-0.3, 0.3):
-            x, y = -forward + along * direction[0], -right + along * direction[1]
-            u, v, w = homography @ (x / 1.1, y / 1.1, 1.0)
-            pixels.append((u / w - LENS.cx_px, v / w - LENS.cy_px))
+            place, row_s = (along * direction[0], along * direction[1]), 0.0
+            for _ in range(4):  # a point is seen when the row that it is seen in is exposed
+                x, y = pixel(hand, t + row_s, mount, place)
+                row_s = y / LENS.height_px * readout_s
+            pixels.append((x, y))
         (ax, ay), (bx, by) = pixels
         normal = math.atan2(bx - ax, -(by - ay))
         rho = ax * math.cos(normal) + ay * math.sin(normal) + rng.gauss(0.0, noise_px)
@@ -70,17 +80,21 @@ def measured(
     noise_px: float = 0.5,
     attitude_hz: float = 50.0,
     lost: float = 0.05,
+    ahead_m: float = 0.0,
+    readout_s: float = 0.0,
+    configured_readout_s: float = 0.0,
 ) -> DelayByTilt:
     """What is told where frames are exposed so much later than their stamps say."""
-    hand, rng, mount = Hand(seed, rocks_rad), random.Random(seed), Mount(yaw_rad=0.3, roll_rad=0.02)
+    hand, rng = Hand(seed, rocks_rad, ahead_m), random.Random(seed)
+    mount = Mount(yaw_rad=0.3, roll_rad=0.02)
     attitudes = [
         Attitude(round((START_S + n / attitude_hz) * 1e9), *hand.tilt(n / attitude_hz), 1.0)
         for n in range(round(SECONDS * attitude_hz))
     ]
-    followed = FollowedLines(LENS.fx_px)
+    followed = FollowedLines(LENS, configured_readout_s)
     for n in range(round(SECONDS * 30)):
         t = n / 30
-        lines = seen_by(hand, t + delay_s, noise_px, rng, mount)
+        lines = seen_by(hand, t + delay_s, noise_px, rng, mount, readout_s)
         followed.add(round((START_S + t) * 1e9), [line for line in lines if rng.random() >= lost])
     return delay_by_tilt(followed.runs, attitudes)
 
@@ -119,3 +133,11 @@ def test_without_attitude_or_lines_nothing_is_told() -> None:
     assert not delay_by_tilt([], []).is_known
     attitudes = [Attitude(n * 20_000_000, 0.1 * math.sin(n / 10), 0.0, 0.0) for n in range(500)]
     assert not delay_by_tilt([], attitudes).is_known
+
+
+@pytest.mark.parametrize("ahead_m", [-0.3, 0.0, 0.3])
+def test_a_line_far_from_the_middle_row_is_seen_when_its_own_row_is_exposed(ahead_m: float) -> None:
+    rolling = partial(measured, 0.06, ahead_m=ahead_m, readout_s=0.03)
+    assert rolling(configured_readout_s=0.03).delay_s == pytest.approx(0.06, abs=0.002)
+    taken_at_once_s = rolling().delay_s - 0.06
+    assert abs(taken_at_once_s) > 0.004 or not ahead_m
