@@ -40,8 +40,8 @@ class WorldKind(enum.StrEnum):
 
 _SENSORS = SensorParams()
 _GUST_RMS_MPS = WindParams().gust_rms_mps
-_LEAPS_AFTER_S = 35.0, 60.0
-"""When delays and clocks leap: what the flight knew twenty seconds after its take-off is judged by then."""
+_LEAPS_AFTER_S = 5.0, 60.0
+"""So long after the vehicle first flew delays and clocks leap: every other time within half a minute."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Unknowns:
     camera_delay_s: float = 0.0
     camera_jitter_s: float = 0.0
     camera_leap: Leap = NEVER
-    """Pictures come later from so long after the first on: a frame more is queued, or one less."""
+    """Pictures come later from then on: a frame more is queued, or one less."""
     mount_roll_rad: float = 0.0
     mount_pitch_rad: float = 0.0
     mount_yaw_rad: float = 0.0
@@ -76,7 +76,7 @@ class Unknowns:
     """Time within which the told attitude leaks towards level; None: it does not."""
     clock_ppm: float = 20.0
     clock_leap: Leap = NEVER
-    """The autopilot's clock is set, so long after its boot."""
+    """The autopilot's clock is set."""
     path_s: tuple[float, float] = (0.0, 0.0)
     """Least delay of telemetry, and of what is sent to the autopilot."""
     path_jitter_s: float = 0.0

@@ -80,13 +80,24 @@ def judge_flight(simulation: Simulation) -> Judgement:
         truth_lost=_lost(world) + evidence.motion.gaps,
         not_looked_at=stock.get("locations_planned", 0) - stock.get("locations_visited", 0),
     )
-    sensors = sensor_summary(simulation, last_known([status.sensors for status in statuses]))
+    sensors = _sensors(simulation, statuses, truth)
     expected = simulation.scenario.expect
     if expected is None:
         return Judgement(figures, stock, sensors, None, tuple(faults))
     row = next(row for row in HAZARDS if row.name == expected.hazard)
     verdict = judged_hazard(row, expected, evidence, figures, faults, [note["stamp_ns"] for note in begun])
     return Judgement(figures, stock, sensors, verdict, verdict.faults)
+
+
+def _sensors(
+    simulation: Simulation, statuses: Sequence[Status], truth: Sequence[Kinematics]
+) -> dict[str, Any]:
+    """What the flight found out of its sensors at its end, beside what they were then."""
+    seen = last_known([status.sensors for status in statuses])
+    told_ns = next((status.stamp_ns for status in reversed(statuses) if status.sensors.is_known), 0)
+    heights = ((k.stamp_ns, k.height_m) for k in truth)
+    leapt = simulation.unknowns.camera_leap.since_s(heights, told_ns) > 0.0
+    return sensor_summary(simulation, seen, leapt=leapt)
 
 
 def _piloted_ns(simulation: Simulation, begun: Sequence[dict[str, Any]]) -> float:

@@ -12,9 +12,10 @@ from flightd.core.tracks import SensorEstimate
 Known: TypeAlias = dict[str, float | None]
 
 
-def sensor_summary(simulation: Simulation, seen: SensorEstimate) -> dict[str, Any]:
+def sensor_summary(simulation: Simulation, seen: SensorEstimate, *, leapt: bool) -> dict[str, Any]:
     """The summary's part on the sensors, of which the lines said `seen` last: `estimated`, `estimated_sigma`
-    and `drawn`, the same keys each.
+    and `drawn`, the same keys each.  The camera's delay is the one after its leap where it had `leapt` when
+    that was said.
 
     The camera's delay is whole, configuration included; `delay_to_attitude_s` is that beside the told
     attitude, which is what the lines tell: by half of what the ways there and back differ, all attitudes of a
@@ -26,7 +27,7 @@ def sensor_summary(simulation: Simulation, seen: SensorEstimate) -> dict[str, An
     return {
         "estimated": _estimated(seen, simulation.config.camera.latency_s),
         "estimated_sigma": _sigma(seen),
-        "drawn": _drawn(simulation),
+        "drawn": _drawn(simulation, leapt=leapt),
     }
 
 
@@ -56,10 +57,11 @@ def _sigma(seen: SensorEstimate) -> Known:
     return known | {"tilt_bias_deg": known["tilt_roll_deg"]}
 
 
-def _drawn(simulation: Simulation) -> Known:
+def _drawn(simulation: Simulation, *, leapt: bool) -> Known:
     unknowns, configured = simulation.unknowns, simulation.scenario.camera.camera()
     roll_rad, pitch_rad = unknowns.tilt_bias_rad or (math.nan, math.nan)
-    delay_s = simulation.camera.latency_s(unknowns.camera(configured))
+    leap_s = unknowns.camera_leap.by_s if leapt else 0.0
+    delay_s = simulation.camera.latency_s(unknowns.camera(configured)) + leap_s
     down, up = unknowns.radio(simulation.scenario.vehicle.radio())
     is_autopilot = simulation.config.vehicle.kind in FIRMWARES and not simulation.truth_url
     late_s = 0.5 * (down.delay_s - up.delay_s) if is_autopilot else math.nan

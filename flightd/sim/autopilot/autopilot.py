@@ -20,7 +20,7 @@ from flightd.sim.autopilot.parameters import ParameterServer
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.autopilot.streams import HEARTBEAT_ID, MessageStreams, whole
 from flightd.sim.autopilot.telemetry import Instruments
-from flightd.sim.leap import NEVER, Leap
+from flightd.sim.leap import NEVER, Leap, LeapInFlight
 from flightd.sim.plant.airframe import Airframe, AirframeCommand
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.truth_history import TruthHistory
@@ -124,7 +124,7 @@ class AutopilotPeer(abc.ABC):
         self._clock = clock
         self._now_ns = self._boot_ns = clock.now_ns()
         self._clock_ppm = config.clock_ppm
-        self._clock_leap = config.clock_leap
+        self._clock_leap = LeapInFlight(config.clock_leap)
         self.streams = MessageStreams(self.link, self, self._now_ns, config.step_ns)
         self._steps = 0
         self._truth = TruthHistory(_TRUTH_SAMPLES)
@@ -370,7 +370,8 @@ class AutopilotPeer(abc.ABC):
     def boot_clock_ns(self, now_ns: int) -> int:
         """The time since boot by the autopilot's own clock."""
         elapsed_ns = now_ns - self._boot_ns
-        return elapsed_ns + round(elapsed_ns * self._clock_ppm * 1e-6) + self._clock_leap.ns(elapsed_ns)
+        leapt_ns = self._clock_leap.ns(now_ns, self.airframe.height_m)
+        return elapsed_ns + round(elapsed_ns * self._clock_ppm * 1e-6) + leapt_ns
 
     def _refresh(self, now_ns: int) -> None:
         self.instruments.boot_ms = self.boot_clock_ns(now_ns) // _NS_PER_MS % _BOOT_WRAP_MS

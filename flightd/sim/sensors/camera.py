@@ -27,7 +27,7 @@ from flightd.runtime.child_process import Child
 from flightd.runtime.clock import Hold
 from flightd.runtime.frame_notice import FrameNotice, decode_request, encode_notice
 from flightd.runtime.frame_ring import FrameRing, FrameTicket
-from flightd.sim.leap import NEVER, Leap
+from flightd.sim.leap import NEVER, Leap, LeapInFlight
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.optics import USUALLY, Taking
 
@@ -147,7 +147,7 @@ class CameraPeer:
         leap: Leap = NEVER,
         drawn: Callable[[FrameTicket], None] = lambda _: None,
     ) -> None:
-        self._name, self._leap, self._drawn = name, leap, drawn
+        self._name, self._leap, self._drawn = name, LeapInFlight(leap), drawn
         self._lamp = lamp
         self._wanted = wanted
         self._hold = hold
@@ -194,7 +194,7 @@ class CameraPeer:
     async def _expose(self, child: Child, transport: Any, pictures: asyncio.TaskGroup) -> None:
         """Take a picture each period; each is rendered and delivered by a task of its own."""
         period_ns = self._period_ns
-        exposure_ns = began_ns = self._clock.now_ns()
+        exposure_ns = self._clock.now_ns()
         seq = 0
         while True:
             exposure_ns += period_ns
@@ -211,7 +211,7 @@ class CameraPeer:
                 truth = self._truth_at(exposure_ns)
                 straggles = seq % self.trouble.straggler_every == 0
                 late_s = self.trouble.late_s + (self.trouble.straggler_s if straggles else 0.0)
-                due_ns += round(late_s * 1e9) + self._leap.ns(exposure_ns - began_ns)
+                due_ns += round(late_s * 1e9) + self._leap.ns(exposure_ns, truth.height_m)
                 how = replace(self._how, lamp=self._lamp())
                 pictures.create_task(self._deliver(child, transport, truth, seq, due_ns, how))
             seq += 1

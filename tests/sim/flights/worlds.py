@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from flightd.core.tracks import SensorEstimate
 from flightd.core.types import Attitude, Phase
 from flightd.replay.log import read_log
 from flightd.sim.judge.verdict import SAFETY_KINDS
+from flightd.sim.leap import NEVER, Leap
 from flightd.sim.plant.plant_kind import PlantKind
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.random_sites import random_site
@@ -86,7 +87,9 @@ class PlannedFlight:
 class Result:
     """What the table tells of one flight; NaN where it got to nothing that can be measured, None where no
     judge said it.  `errors` are the sensors' estimates less the truth after 20 s in the air: delay (ms), and
-    the greater one of roll and pitch of mount and tilt bias (deg)."""
+    the greater one of roll and pitch of mount and tilt bias (deg).  `since_leap_s` is how long before then
+    the camera's delay (`camera`) and the autopilot's clock (`clock`) leapt, below 0 where they did later; the
+    true delay is the one of then."""
 
     planned: PlannedFlight
     completed: bool
@@ -98,11 +101,16 @@ class Result:
     unsafe: bool | None
     reason: str
     errors: dict[str, float] = field(default_factory=dict)
+    since_leap_s: dict[str, float] = field(default_factory=dict)
 
     @property
     def is_good(self) -> bool:
         """Completed, and safe as far as one asks: by computed sight nobody does."""
         return self.completed and (self.planned.ideal or self.unsafe is False)
+
+
+Rows: TypeAlias = Sequence[dict[str, Any]]
+"""What a truth log holds, of the fields of `Kinematics` each."""
 
 
 class _SensorProbe:
@@ -111,6 +119,7 @@ class _SensorProbe:
 
     def __init__(self) -> None:
         self.seen: SensorEstimate | None = None
+        self.seen_ns = 0
         self.told = deque[Attitude](maxlen=50)
         self._up_ns: int | None = None
 
@@ -121,14 +130,16 @@ class _SensorProbe:
         if self._up_ns is None or tracks is None or not tracks.sensors.is_known:
             return
         if self.seen is None or (status.stamp_ns - self._up_ns) * 1e-9 < _KNOWN_AFTER_S:
-            self.seen = tracks.sensors
+            self.seen, self.seen_ns = tracks.sensors, status.stamp_ns
             if status.vehicle is not None:
                 self.told.append(status.vehicle.attitude)
 
-    def tilt_error_deg(self, truth_log: Path) -> tuple[float, float]:
+    def since_s(self, leap: Leap, truth: Rows) -> float:
+        """How long before that a leap had come."""
+        return leap.since_s(((row["stamp_ns"], row["height_m"]) for row in truth), self.seen_ns)
+
+    def tilt_error_deg(self, rows: Rows) -> tuple[float, float]:
         """By how much roll and pitch were told too large, on average."""
-        truth = read_log(truth_log, {Topic.TRUTH}).entries
-        rows = [entry.message for entry in truth if isinstance(entry.message, dict)]
         stamps = [row["stamp_ns"] for row in rows]
         at = [told.stamp_ns for told in self.told]
         roll, pitch = (np.interp(at, stamps, [row[key] for row in rows]) for key in ("roll_rad", "pitch_rad"))
@@ -172,10 +183,13 @@ def _flown_by_pictures(planned: PlannedFlight) -> Result:
         except RunError as err:
             ended = str(err)
         judgement = judge_flight(simulation)
-        errors = {}
+        errors, since_leap_s = {}, dict[str, float]()
         if probe.seen is not None:
-            tilt_deg = probe.tilt_error_deg(simulation.truth_log)
-            errors = _errors(sensor_summary(simulation, probe.seen), tilt_deg)
+            truth = _truth(simulation.truth_log)
+            leaps = {"camera": simulation.unknowns.camera_leap, "clock": simulation.unknowns.clock_leap}
+            since_leap_s = {name: probe.since_s(leap, truth) for name, leap in leaps.items() if leap != NEVER}
+            leapt = since_leap_s.get("camera", -math.inf) > 0.0
+            errors = _errors(sensor_summary(simulation, probe.seen, leapt=leapt), probe.tilt_error_deg(truth))
     score = judgement.score
     return Result(
         planned=planned,
@@ -188,7 +202,12 @@ def _flown_by_pictures(planned: PlannedFlight) -> Result:
         unsafe=any(fault.kind in SAFETY_KINDS for fault in judgement.faults),
         reason=ended or score.reason,
         errors=errors,
+        since_leap_s=since_leap_s,
     )
+
+
+def _truth(log: Path) -> Rows:
+    return [one.message for one in read_log(log, {Topic.TRUTH}).entries if isinstance(one.message, dict)]
 
 
 def _errors(sensors: dict[str, dict[str, float | None]], tilt_deg: tuple[float, float]) -> dict[str, float]:
@@ -280,7 +299,9 @@ def _known_line(results: Sequence[Result]) -> str:
         return ""
     bounds = {"delay_ms": _DELAY_MS, "mount_deg": _ANGLE_DEG, "tilt_deg": _ANGLE_DEG}
     known = (f"{key} {sum(abs(e[key]) <= most for e in told)}" for key, most in bounds.items())
-    return f"; of {len(told)} known after {_KNOWN_AFTER_S:.0f} s: " + ", ".join(known)
+    leapt = sum(result.since_leap_s.get("camera", -math.inf) > 0.0 for result in results)
+    late = f" (the delay of {leapt} leapt before)" if leapt else ""
+    return f"; of {len(told)} known after {_KNOWN_AFTER_S:.0f} s: " + ", ".join(known) + late
 
 
 def _line(result: Result) -> str:
@@ -289,17 +310,22 @@ def _line(result: Result) -> str:
     outcome = f"{'completed' if result.completed else 'ABORTED'}{judged}: {result.reason} {result.faults}"
     off = "" if planned.off_ms is None else f"{planned.off_ms:+d}"
     known = f"{e['delay_ms']:+6.1f} {e['mount_deg']:5.2f} {e['tilt_deg']:5.2f}" if e else " " * 18
+    leapt = "+".join(name for name, since_s in result.since_leap_s.items() if since_s > 0.0)
     return (
         f"{planned.seed:>6} {off:>4} {result.rms_m:6.3f} {result.hover_p95_m:6.3f} {result.landed_m:6.3f}"
-        f" {known}  {outcome}"
+        f" {known}  {leapt:12}  {outcome}"
     )
 
 
 def _document(result: Result) -> dict[str, Any]:
-    found = asdict(result)
-    return {
-        key: None if isinstance(value, float) and math.isnan(value) else value for key, value in found.items()
-    }
+    """JSON has neither NaN nor infinity."""
+
+    def known(value: object) -> object:
+        if isinstance(value, dict):
+            return {key: known(one) for key, one in value.items()}
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return {key: known(value) for key, value in asdict(result).items()}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -342,7 +368,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for seed in range(int(first), int(last or first) + 1)
     ]
     results = []
-    print(f"{'seed':>6} {'off':>4} {'rms':>6} {'p95':>6} {'landed':>6}  delay mount  tilt  outcome")
+    print(f"{'seed':>6} {'off':>4} {'rms':>6} {'p95':>6} {'landed':>6}  delay mount  tilt  {'leapt':12}  end")
     with ProcessPoolExecutor(given.jobs, max_tasks_per_child=1) as pool:
         for result in pool.map(flown, each):
             results.append(result)

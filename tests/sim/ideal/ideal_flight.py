@@ -35,6 +35,7 @@ from flightd.core.types import (
 )
 from flightd.ports import Lamp
 from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
+from flightd.sim.leap import LeapInFlight
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.plant.charge_pads import ChargePads, PadService
 from flightd.sim.plant.kinematics import Kinematics
@@ -154,7 +155,7 @@ class IdealFlight:
         if carried_to:
             x_m, y_m = site.nodes[carried_to].x_m, site.nodes[carried_to].y_m
         self._armed = False
-        self._now_ns = self._began_ns = 1_000_000_000_000
+        self._now_ns = 1_000_000_000_000
         unknown = unknowns or Unknowns()
         frame = unknown.airframe(airframe or AirframeParams())
         wash = unknown.wash(world, seed)
@@ -165,7 +166,7 @@ class IdealFlight:
         self._eye = IdealEye(world, camera.lens, camera.mount, errors, seed)
         self._shaken = Shaken(unknown.shake_rad, seed)
         self._camera_off_ns = round(unknown.camera_delay_s * 1e9)
-        self._camera_leap = unknown.camera_leap
+        self._camera_leap = LeapInFlight(unknown.camera_leap)
         self._jitter_s, self._jitter = unknown.camera_jitter_s, random.Random(f"jitter {seed}")
         self._climb = ClimbLoop(ClimbGains(hover_guess=frame.hover_collective))
         self._delay_ns = delay_ns
@@ -327,7 +328,7 @@ class IdealFlight:
 
     @property
     def _off_ns(self) -> int:
-        leapt_ns = self._camera_leap.ns(self._now_ns - self._began_ns)
+        leapt_ns = self._camera_leap.ns(self._now_ns, self.airframe.height_m)
         return self._camera_off_ns + self.faults.delay_ns + leapt_ns
 
     def _see(self, seq: int) -> LineSet:

@@ -15,6 +15,7 @@ from flightd.adapters.vehicle.mavlink.vehicle import RATES_HZ
 from flightd.core.types import Attitude, AttitudeSetpoint, VehicleState
 from flightd.sim.autopilot.radio import RadioParams
 from flightd.sim.autopilot.telemetry import LANDED_AIR, LANDED_GROUND, Instruments
+from flightd.sim.leap import LeapInFlight
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.sensors.instruments import Sensors
 from flightd.sim.unknowns import Unknowns
@@ -58,7 +59,7 @@ class IdealLink:
         self._down: Line[Any] = Line(down, f"down {seed}")
         self._up: Line[Any] = Line(up, f"up {seed}")
         self._boot_ns, self._ppm = now_ns - _BOOT_NS, unknowns.clock_ppm
-        self._leap = unknowns.clock_leap
+        self._leap = LeapInFlight(unknowns.clock_leap)
         self._airframe = airframe
         self._instruments = Instruments(airframe, sensors)
         self._due_ns = dict.fromkeys(RATES_HZ, now_ns)
@@ -99,7 +100,8 @@ class IdealLink:
 
     def _theirs_ns(self, now_ns: int) -> int:
         since_ns = now_ns - self._boot_ns
-        return since_ns + round(since_ns * self._ppm * 1e-6) + self._leap.ns(since_ns)
+        leapt_ns = self._leap.ns(now_ns, self._airframe.height_m)
+        return since_ns + round(since_ns * self._ppm * 1e-6) + leapt_ns
 
     def _talk(self, now_ns: int, setpoint: AttitudeSetpoint | None) -> None:
         if setpoint is not None and setpoint is not self._sent:
