@@ -41,6 +41,7 @@ class FlightResult:
     frames: int
     frames_dropped: int
     latency_ms: dict[str, float]
+    arrival_to_wire_ms: dict[str, float] = field(default_factory=dict)
     setpoint_interval_ms: dict[str, float] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)
     restarts: dict[str, int] = field(default_factory=dict)
@@ -171,6 +172,7 @@ class Daemon:
             frames=flight.camera.frames,
             frames_dropped=sum(flight.vision.dropped.values()),
             latency_ms=flight.vision.latency_quantiles_ms(),
+            arrival_to_wire_ms=flight.vision.arrival_to_wire_ms(),
             setpoint_interval_ms=flight.setpoints.interval_quantiles_ms(),
             dropped=self._tick.dropped,
             restarts=self._tick.restarts,

@@ -70,6 +70,10 @@ class Vision(Protocol):
         """p50 and p99 of the whole way, over the flight."""
         ...
 
+    def arrival_to_wire_ms(self) -> dict[str, float]:
+        """The same from the frames' arrival on, without the camera's own delay."""
+        ...
+
     def not_flying(self) -> None:
         """No setpoint goes out: frames on their way to one count for nothing."""
         ...

@@ -183,7 +183,7 @@ def _fly(simulation: Simulation, *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(summary, indent=2))
     else:
-        _print_summary(summary, report)
+        _print_summary(summary, report, simulation.speed)
     if interrupted is not None:
         _say(str(interrupted))
         raise typer.Exit(128 + interrupted.signal)
@@ -213,16 +213,38 @@ def _counted(summary: dict[str, Any]) -> str:
     return f"{visited} ({rate:.0f} an hour): {codes}; {empty}"
 
 
-def _print_summary(summary: dict[str, Any], report: Path) -> None:
+def _times(simulated_s: float, wall_s: float) -> str:
+    return f"{wall_s:.0f} s ({simulated_s / max(wall_s, 1e-9):.1f} x)"
+
+
+def _latencies(summary: dict[str, Any], speed: float | None) -> list[tuple[str, str]]:
+    """What was measured, by which clock; in lockstep what the simulator takes a detection for."""
+    from flightd.app.simulation.launch import DETECTION_S
+
+    def both(ms: dict[str, float]) -> str:
+        return f"{ms['p50']:.0f} ms, p99 {ms['p99']:.0f} ms"
+
+    whole, ours = both(summary["latency_ms"]), summary["arrival_to_wire_ms"]
+    if ours is not None:
+        return [("exposure to setpoint", whole), ("without the camera's delay", both(ours))]
+    clock = f"modelled: in lockstep a detection takes {DETECTION_S * 1e3:.0f} ms; --speed 1 measures"
+    if speed is not None:
+        clock = f"by a clock {speed:g} times as fast"
+    return [("exposure to setpoint", f"{whole} ({clock})")]
+
+
+def _print_summary(summary: dict[str, Any], report: Path, speed: float | None) -> None:
     from rich.console import Console
     from rich.table import Table
+
+    from flightd.runtime.process_age import process_age_s
 
     def metres(key: str) -> str:
         value = summary[key]
         return "-" if value is None else f"{value * 100:.1f} cm"
 
     table = Table(title=f"Mission {_ending(summary)}", show_header=False, title_justify="left")
-    simulated, wall = summary["flight_time_s"], summary["wall_time_s"]
+    simulated, wall, whole_s = summary["flight_time_s"], summary["wall_time_s"], process_age_s()
     rows = [
         (
             "nodes visited",
@@ -232,13 +254,15 @@ def _print_summary(summary: dict[str, Any], report: Path) -> None:
         ("hover error, p95", metres("hover_error_p95_m")),
         ("nearest to rack or ceiling", metres("min_clearance_m")),
         ("landing error", metres("landed_error_m")),
-        ("flight time", f"{simulated:.0f} s in {wall:.0f} s ({simulated / max(wall, 1e-9):.1f} x)"),
+        ("flight time", f"{simulated:.0f} s, flown in {_times(simulated, wall)}"),
+        *(
+            [("whole command", _times(simulated, whole_s) + " with its start, verdict and report")]
+            if whole_s
+            else []
+        ),
         *([("locations", _counted(summary))] if summary.get("locations_planned") else []),
         ("frames", f"{summary['frames']}, {summary['frames_dropped']} dropped"),
-        (
-            "exposure to setpoint",
-            f"{summary['latency_ms']['p50']:.0f} ms, p99 {summary['latency_ms']['p99']:.0f} ms",
-        ),
+        *_latencies(summary, speed),
         ("verdict", _verdict(summary)),
         ("report", str(report)),
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import statistics
 import time
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
@@ -30,7 +31,7 @@ _LEAST_PICTURES = 5
 _SLOW = 0.85
 _DARK, _BRIGHT = 12.0, 243.0
 _BUSY = 0.8
-_TRIES = 3
+_LOOKS = 7
 
 
 @dataclass(slots=True)
@@ -165,9 +166,9 @@ def check_vision(config: Config, detector: Detector, picture: Image | None) -> l
     name = f"{config.vision.method}, profile {detector.profile.name}"
     if picture is None:
         return [warning("vision", f"{name}: loads, had no picture to look at", "see the camera's line")]
-    best_s, lines = look(detector, picture)
-    text = f"{name}: {best_s * 1000:.0f} ms a picture, {lines} lines seen"
-    busy = best_s * config.camera.fps / config.vision.workers
+    usual_s, lines = look(detector, picture)
+    text = f"{name}: {usual_s * 1000:.0f} ms a picture, {lines} lines seen"
+    busy = usual_s * config.camera.fps / config.vision.workers
     checks = []
     if busy > _BUSY:
         remedy = "more vision.workers, smaller pictures or a lower camera.fps; pictures will be dropped"
@@ -179,10 +180,10 @@ def check_vision(config: Config, detector: Detector, picture: Image | None) -> l
 
 
 def look(detector: Detector, picture: Image) -> tuple[float, int]:
-    """The shortest time of some looks at a picture, s, and the lines in it."""
-    best_s, lines = float("inf"), 0
-    for _ in range(_TRIES):
+    """The usual time of a look at a picture, s (the median of several), and the lines in it."""
+    took_s, lines = list[float](), 0
+    for _ in range(_LOOKS):
         start_s = time.perf_counter()
         lines = len(detector.detect(picture).lines)
-        best_s = min(best_s, time.perf_counter() - start_s)
-    return best_s, lines
+        took_s.append(time.perf_counter() - start_s)
+    return statistics.median(took_s), lines

@@ -23,7 +23,7 @@ _NEAR = 0.8
 @dataclass(frozen=True, slots=True)
 class Stages:
     """What was measured: by how much the slowest picture came later than `camera.latency_s` has it, and how
-    long the detector looked, s."""
+    long the detector usually looks, s."""
 
     late_s: float
     detector_s: float
@@ -67,12 +67,13 @@ def delay_as_measured(config: Config, told: DelayByTilt) -> KnownDelay:
 
 
 def judge_latency(config: Config, stages: Stages, known: KnownDelay) -> Check:
-    """The whole way from exposure to setpoint."""
+    """The whole way from exposure to setpoint, as far as it is known on the ground."""
     most_s, camera_s = config.hazards.latency_s, max(known.delay_s + stages.late_s, 0.0)
     whole_s = camera_s + stages.detector_s + CLOSEST_TICKS_S
     text = (
         f"{whole_s * 1000:.0f} ms from exposure to setpoint: camera {camera_s * 1000:.0f} ({known.source}),"
-        f" detector {stages.detector_s * 1000:.0f}, up to {CLOSEST_TICKS_S * 1000:.0f} until the next tick"
+        f" detector {stages.detector_s * 1000:.0f}, up to {CLOSEST_TICKS_S * 1000:.0f} until the next tick;"
+        " what other work on this computer, the tick itself and the line to the vehicle take is not in it"
     )
     remedy = (
         f"hazards.latency_s allows {most_s * 1000:.0f} ms: a camera with less delay (camera.latency_s is its"

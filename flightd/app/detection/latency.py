@@ -20,7 +20,7 @@ class LatencyBook:
 
     def __init__(self) -> None:
         self._waiting: list[tuple[Detection, int]] = []
-        self._totals_ms = Series()
+        self._totals_ms, self._ours_ms = Series(), Series()
         self._since: list[dict[str, float]] = []
         self._recent: deque[tuple[int, float]] = deque(maxlen=_RECENT_MAX)
         self._before: FrameTicket | None = None
@@ -57,6 +57,7 @@ class LatencyBook:
             }
             self._since.append(self.newest)
             self._totals_ms.add(total)
+            self._ours_ms.add(total - capture)
             self._recent.append((now_ns, (now_ns - self._oldest_ns(ticket)) * 1e-6))
             self._before = ticket
         self._waiting.clear()
@@ -88,5 +89,12 @@ class LatencyBook:
 
     def quantiles_ms(self) -> dict[str, float]:
         """p50 and p99 of the whole way, rounded to a hundredth; zeros before any frame was flown by."""
-        totals = self._totals_ms
-        return {name: round(totals.quantile(share), 2) for name, share in (("p50", 0.5), ("p99", 0.99))}
+        return _quantiles(self._totals_ms)
+
+    def arrival_to_wire_ms(self) -> dict[str, float]:
+        """The same without the camera's own delay: from the frame's arrival on."""
+        return _quantiles(self._ours_ms)
+
+
+def _quantiles(ms: Series) -> dict[str, float]:
+    return {name: round(ms.quantile(share), 2) for name, share in (("p50", 0.5), ("p99", 0.99))}

@@ -124,6 +124,9 @@ class DetectionPipeline:
     def latency_quantiles_ms(self) -> dict[str, float]:
         return self.latency.quantiles_ms()
 
+    def arrival_to_wire_ms(self) -> dict[str, float]:
+        return self.latency.arrival_to_wire_ms()
+
     def not_flying(self) -> None:
         self.latency.forget()
 

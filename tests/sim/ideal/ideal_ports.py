@@ -105,6 +105,9 @@ class IdealVision:
     def latency_quantiles_ms(self) -> dict[str, float]:
         return {}
 
+    def arrival_to_wire_ms(self) -> dict[str, float]:
+        return {}
+
     def not_flying(self) -> None:
         """No frame waits for a setpoint."""
 

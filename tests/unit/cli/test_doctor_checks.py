@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from flightd.config.recorder import RecorderConfig
 from flightd.config.schema import Config, load_config
 from flightd.config.vehicle import VehicleConfig
 from flightd.doctor.calibration import check_calibration
-from flightd.doctor.camera import Pictures, check_vision, judge_camera, judge_front_camera
+from flightd.doctor.camera import Pictures, check_vision, judge_camera, judge_front_camera, look
 from flightd.doctor.check import Check, CheckLevel
 from flightd.doctor.computer import check_fitness
 from flightd.doctor.label_text import check_text
@@ -231,6 +232,21 @@ def test_pictures_that_come_too_late_to_fly_by_are_told_before_the_flight(
     check = judge_latency(settings, stages, delay_before_a_flight(settings))
     assert levels([check]) == [expected]
     assert "hazards.latency_s" in check.remedy or expected is CheckLevel.OK
+
+
+def test_a_look_takes_the_usual_time_and_not_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
+    took_s = [0.001, 0.009, 0.009, 0.002, 0.008, 0.009, 0.100]
+    clock = iter([moment for at, took in enumerate(took_s) for moment in (float(at), at + took)])
+    monkeypatch.setattr("flightd.doctor.camera.time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    usual_s, lines = look(Detector("combined", "yellow"), np.zeros((36, 64, 3), np.uint8))
+    assert usual_s == pytest.approx(0.009)
+    assert lines == 0
+
+
+def test_the_line_of_latency_says_what_is_not_in_it() -> None:
+    settings = config()
+    text = judge_latency(settings, Stages(0.0, 0.01), delay_before_a_flight(settings)).text
+    assert "the line to the vehicle take is not in it" in text
 
 
 def test_a_delay_that_is_configured_or_learnt_is_not_told_as_measured(tmp_path: Path) -> None:

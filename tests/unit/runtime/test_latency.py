@@ -70,3 +70,11 @@ def test_a_camera_that_counts_anew_is_no_drop() -> None:
     fly(book, 100)
     now_ns = fly(book, 3)
     assert book.recent_p99_s(now_ns) == pytest.approx(WAY_NS * 1e-9)
+
+
+def test_the_cameras_own_delay_is_told_apart() -> None:
+    book = LatencyBook()
+    for seq in range(100):
+        fly(book, seq, WAY_NS if seq % 10 else WAY_NS + 15_000_000)
+    assert book.quantiles_ms() == {"p50": 80.0, "p99": 95.0}
+    assert book.arrival_to_wire_ms() == {"p50": 70.0, "p99": 85.0}
