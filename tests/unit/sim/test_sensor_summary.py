@@ -35,7 +35,7 @@ def simulation(tmp_path: Path) -> Simulation:
 
 
 def test_what_was_found_stands_beside_what_was_drawn_with_the_same_keys(simulation: Simulation) -> None:
-    told = sensor_summary(simulation, SEEN)
+    told = sensor_summary(simulation, SEEN, leapt=False)
     assert told["estimated"] == {
         "camera_delay_s": pytest.approx(simulation.config.camera.latency_s + 0.012),
         "delay_to_attitude_s": pytest.approx(simulation.config.camera.latency_s + 0.012),
@@ -58,7 +58,7 @@ def test_what_was_found_stands_beside_what_was_drawn_with_the_same_keys(simulati
 
 
 def test_the_drawn_delay_is_the_whole_one(simulation: Simulation) -> None:
-    drawn = sensor_summary(simulation, NOT_SEEN)["drawn"]
+    drawn = sensor_summary(simulation, NOT_SEEN, leapt=False)["drawn"]
     delay_s = simulation.scenario.camera.capture_delay_s + simulation.unknowns.camera_delay_s
     assert drawn["camera_delay_s"] == pytest.approx(delay_s, abs=1e-4)
     down_s, up_s = simulation.unknowns.path_s
@@ -68,5 +68,15 @@ def test_the_drawn_delay_is_the_whole_one(simulation: Simulation) -> None:
 
 
 def test_before_any_line_nothing_is_estimated(simulation: Simulation) -> None:
-    told = sensor_summary(simulation, NOT_SEEN)
+    told = sensor_summary(simulation, NOT_SEEN, leapt=False)
     assert set(told["estimated"].values()) == set(told["estimated_sigma"].values()) == {None}
+
+
+def test_the_drawn_delay_is_the_one_after_its_leap_where_the_flight_felt_it(tmp_path: Path) -> None:
+    rough = prepare(SimOptions(seed=3, world="rough"), Scenario(), tmp_path, lambda _: None)
+    before, after = (sensor_summary(rough, NOT_SEEN, leapt=leapt)["drawn"] for leapt in (False, True))
+    leap_s = rough.unknowns.camera_leap.by_s
+    assert abs(leap_s) == 0.033
+    for key in ("camera_delay_s", "delay_to_attitude_s"):
+        assert after[key] - before[key] == pytest.approx(leap_s, abs=2e-4)
+    assert after["mount_yaw_deg"] == before["mount_yaw_deg"]
