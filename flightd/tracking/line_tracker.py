@@ -156,11 +156,6 @@ class LineTracker:
         return self._stamp_ns
 
     @property
-    def delay_sigma_s(self) -> float:
-        """How well the camera's delay is known."""
-        return self._filter.delay_sigma_s
-
-    @property
     def lean_leaps(self) -> int:
         """How often roll and pitch were told otherwise while the gyros felt no turn."""
         return self._carried_lean.leaps
@@ -261,7 +256,7 @@ class LineTracker:
         view = self._view(attitude, stamp_ns, told_m, self._lens)
         by_width_m = [one for one in heights_by_width(lines.lines, view, self._line_width_m) if one > 0.0]
         off_share = self._filter.mean(HEIGHT) + self._filter.mean(HEIGHT_SCALE)
-        climbed_m = climbed_between_m(climb_mps, self.delay_sigma_s)
+        climbed_m = climbed_between_m(climb_mps, self._filter.delay_sigma_s)
         height_m = self._widths.believed_m(by_width_m, told_m, stamp_ns, climbed_m) * (1.0 + off_share)
         by_lens = 1.0 - self._filter.mean(SCALE)
         return self._near_floor.height_m([by_lens * one for one in by_width_m], height_m, stamp_ns)

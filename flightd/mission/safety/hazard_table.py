@@ -346,8 +346,8 @@ HAZARDS: tuple[Hazard, ...] = (
         "what lines err by while the drone leans, all of them together: Page's test for a delay of the camera"
         " that is another one by 20 ms",
         Action.REPORT,
-        "it is learnt anew, as quickly as at first; until it is known the drone is flown as slowly as with an"
-        " unknown one",
+        "it is learnt anew, as quickly as at first: to 10 ms within a second in which it leans; lines that a"
+        " lean moves count for less until then, and the gains stay as they are",
         _FAST,
     ),
     Hazard(
