@@ -1,14 +1,22 @@
 """A position loop that swings by itself: found by its velocity, and slowed down.  Pure.
 
 A loop whose gains are too high for the delay in it swings about its reference ever wider, or as wide as its
-limits let it.  A gust pushes once; what swings to and fro, and no less each time, is the loop.  Slower it is
-stable again: gains lowered with the damping kept ask for less phase at the crossover (K. J. Astrom, R. M.
-Murray, Feedback Systems, 2008, ch. 9: delay margin).
+limits let it.  A gust pushes once; what swings to and fro, and no less each time, is the loop.  A loop that
+swings leans as far as it may to either side and keeps its time: that tells it from gusts where it is slow.
+
+The slower, the later it is found: one that is too late by 60 to 180 ms swings every 1.4 to 2.5 s and is found
+within two seconds of its full swing, up to which it grows; one that has it at once only after 1.2 periods.
+Slower than `_STEEP_MPS` nothing is told: gusts do as much.
+
+Slower it is stable again: gains lowered with the damping kept ask for less phase at the crossover (K. J.
+Astrom, R. M. Murray, Feedback Systems, 2008, ch. 9: delay margin).
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
+from itertools import pairwise
 
 _LEAST_MPS = 0.4
 """Half swings that stay slower are none: gusts make as much."""
@@ -19,6 +27,12 @@ _DECAY = 0.8
 """A half swing of less than this share of the one before it dies away."""
 _GROWN, _GROWN_MPS = 1.4, 0.5
 """One of more than this share of that before it, and so fast, grows: two of them tell it."""
+_STEEP_MPS, _STEEP_MPS2 = 0.3, 1.5
+"""Half swings that lean so far are told though they are no faster than this: by its limits of the lean a loop
+that is 60 ms too late, and swings every 1.4 s, has 1.8 m/s^2."""
+_STEADY, _EVEN = 0.85, 1.2
+"""They are those of a loop where none has less than this share of the one before it, nor as much more, and
+none lasts so much longer than another one."""
 _EASED = 0.6
 LEAST_EASE = 0.35
 """The slowest at which a drone is still held against the air."""
@@ -50,6 +64,8 @@ class _Axis:
         self._peak_mps = 0.0
         self._swings = 0
         self._before_mps = 0.0
+        self._halves = deque[tuple[float, float]](maxlen=_HALF_SWINGS - 1)
+        """The half swings before the one in hand: how fast, m/s, and for how long, s."""
 
     def step(self, now_ns: int, off_mps: float) -> bool:
         """Take the velocity against that of the reference; True once it swings on."""
@@ -65,10 +81,12 @@ class _Axis:
         lasted_s = (now_ns - self._since_ns) * 1e-9
         if lasted_s > _LONGEST_S:
             self._swings = 0
+            self._halves.clear()
         counts = self._counts() and lasted_s > _SHORTEST_S
         peak_mps = abs(self._peak_mps)
         grows = counts and self._swings > 0 and peak_mps > max(_GROWN * self._before_mps, _GROWN_MPS)
-        return grows or self._swings + counts >= _HALF_SWINGS
+        keeps_time = lasted_s > _SHORTEST_S and self._keeps_time(peak_mps)
+        return grows or keeps_time or self._swings + counts >= _HALF_SWINGS
 
     @property
     def peak_mps(self) -> float:
@@ -78,9 +96,20 @@ class _Axis:
     def _turn(self, now_ns: int, since_ns: int) -> None:
         if (now_ns - since_ns) * 1e-9 >= _SHORTEST_S:
             self._swings = self._swings + 1 if self._counts() else 0
+            self._halves.append((abs(self._peak_mps), (now_ns - since_ns) * 1e-9))
             self._before_mps = abs(self._peak_mps)
             self._since_ns = now_ns
         self._peak_mps = 0.0
+
+    def _keeps_time(self, peak_mps: float) -> bool:
+        """The half swing in hand, as far as it has come, and those before it are steep and all alike."""
+        if len(self._halves) < _HALF_SWINGS - 1 or peak_mps <= _STEEP_MPS:
+            return False
+        lasted_s = [one_s for _, one_s in self._halves]
+        steep = all(mps > _STEEP_MPS and math.pi * mps > _STEEP_MPS2 * one_s for mps, one_s in self._halves)
+        speeds = [*(mps for mps, _ in self._halves), peak_mps]
+        steady = all(_STEADY < later / mps < 1.0 / _STEADY for mps, later in pairwise(speeds))
+        return steep and steady and max(lasted_s) < _EVEN * min(lasted_s)
 
     def _counts(self) -> bool:
         """The half swing in hand is one, by what it has come to so far."""

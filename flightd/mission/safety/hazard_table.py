@@ -388,7 +388,9 @@ HAZARDS: tuple[Hazard, ...] = (
         "swings",
         Trigger.SWINGS,
         "half swings of the velocity about the reference's above 0.4 m/s: three, none smaller than four"
-        " fifths of the one before, or two that grow: the position loop is too fast for what is late in it",
+        " fifths of the one before, or two that grow; above 0.3 m/s three that are all alike and lean by 1.5"
+        " m/s^2: the position loop is too fast for what is late in it. Found within 2 s of the full swing"
+        " where it is 60 to 180 ms too late; a swing of 7 cm or less is not told from gusts",
         Action.HOLD,
         "slowed down to 60 %, then to 35 %, at once where it swings faster than 0.8 m/s, and hardly more than"
         " level where even that does; tried faster again once after 8 s of calm; brake, hold; on when"

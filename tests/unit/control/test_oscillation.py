@@ -37,6 +37,23 @@ def test_a_limit_cycle_is_found_within_two_seconds(period_s: float) -> None:
     assert (swung(OscillationMonitor(), swing(period_s, 0.05, 5.0)) or math.inf) <= 2.0
 
 
+def test_one_of_eight_centimetres_is_found_by_its_fourth_half_swing() -> None:
+    period_s = 1.36
+    found_s = swung(OscillationMonitor(), swing(period_s, 0.0, 5.0, 0.08 * math.tau / period_s))
+    assert (found_s or math.inf) <= 2.0 * period_s
+
+
+def test_as_slow_half_swings_that_keep_no_time_are_none() -> None:
+    uneven = [
+        0.38 * sign * math.sin(math.pi * tick / ticks)
+        for sign, ticks in ((1, 30), (-1, 45), (1, 30), (-1, 45), (1, 30))
+        for tick in range(ticks)
+    ]
+    even = [0.38 * sign * math.sin(math.pi * tick / 33) for sign in (1, -1, 1, -1, 1) for tick in range(33)]
+    assert swung(OscillationMonitor(), even) is not None
+    assert swung(OscillationMonitor(), uneven) is None
+
+
 def test_one_that_grows_is_found_by_its_second_half_swing() -> None:
     assert (swung(OscillationMonitor(), swing(2.0, 0.7, 5.0, 0.4)) or math.inf) <= 2.0
 
@@ -71,7 +88,9 @@ def test_one_that_dies_away_is_none() -> None:
 @pytest.mark.parametrize(
     ("found", "none"),
     [
-        pytest.param((1.0, 1.0, 0.44), (1.0, 1.0, 0.41), id="how fast"),
+        pytest.param((2.0, 1.0, 0.42), (2.0, 1.0, 0.40), id="how fast"),
+        pytest.param((1.0, 1.0, 0.34), (1.0, 1.0, 0.30), id="how fast where it is steep"),
+        pytest.param((1.4, 1.0, 0.38), (1.6, 1.0, 0.38), id="how steep"),
         pytest.param((1.0, 0.83, 1.5), (1.0, 0.77, 1.5), id="how little it dies away"),
         pytest.param((4.8, 1.0, 0.45), (5.2, 1.0, 0.45), id="no slower"),
     ],
