@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from flightd.site.painted_lines import nearest_end
 from flightd.site.site import PAD_REACH_M, Marker, PadSign, PaintedLine, Site
+from flightd.site.ways import KEEP_OUT_CLEARANCE_M
 
 
 def mistakes(site: Site) -> Iterator[tuple[str, str]]:
@@ -59,7 +60,11 @@ def _keep_outs(site: Site) -> Iterator[tuple[str, str]]:
                 f"{area.from_m:g} m is not below to_m and the ceiling ({site.ceiling_m:g} m)",
             )
         elif area.touches(home.x_m, home.y_m, home.x_m, home.y_m):
-            yield key, f"covers {home.id}, where missions start; move it or the home pad"
+            yield (
+                key,
+                f"covers {home.id}, where missions start, or comes within {KEEP_OUT_CLEARANCE_M:g} m of it;"
+                " move it or the home pad",
+            )
 
 
 def _markers(site: Site) -> Iterator[tuple[str, str]]:

@@ -10,13 +10,16 @@ import numpy as np
 
 from flightd.site.rack_depth import rack_body
 from flightd.site.site import Node, Site
-from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut
+from flightd.site.ways import BODY_RADIUS_M, KEEP_OUT_HEIGHT_M, KeepOut
 
 _BACK_MPS = 0.3
 """Who comes back faster than this may brake."""
-NEAR_KEEP_OUT_M = KEEP_OUT_CLEARANCE_M / 2
-"""Nearer to a keep-out than this the free way is left: half of what every open line keeps from it."""
-_BESIDE_SHELF_M, _LEAST_M = 0.35, 0.2
+NEAR_KEEP_OUT_M = BODY_RADIUS_M + 0.15
+"""Nearer to a keep-out than this the free way is left, the body still outside it: half of what every open
+line keeps from it besides the body."""
+_BRAKES_AFTER_S = 0.3
+"""So long a drone goes on as before: what is known of it is old, and its lean has yet to change."""
+_BESIDE_SHELF_M, _LEAST_M = BODY_RADIUS_M + 0.05, 0.2
 """The free way ends so far before a rack, for a drone has a width, but is no narrower than this."""
 
 
@@ -33,9 +36,11 @@ class Nearest:
 
 class Corridor:
     """All points off the keep-outs within `half_width_m` of an edge of the grid that none of them closes;
-    less where a rack stands nearer, as the racks' ends do beside a cross way."""
+    less where a rack stands nearer, as the racks' ends do beside a cross way.  `brake_mps2`: how fast the
+    drone can lose the speed at which it comes towards a keep-out."""
 
-    def __init__(self, site: Site, half_width_m: float) -> None:
+    def __init__(self, site: Site, half_width_m: float, brake_mps2: float = 1.0) -> None:
+        self._brake_mps2 = brake_mps2
         self._keep_outs = site.keep_outs
         self._low_keep_outs = site.low_keep_outs
         ends = [(site.nodes[edge.a], site.nodes[edge.b]) for edge in site.edges]
@@ -96,22 +101,27 @@ class Corridor:
     def back(
         self, x_m: float, y_m: float, vx_mps: float, vy_mps: float, height_m: float = math.inf
     ) -> tuple[float, float] | None:
-        """Near a keep-out, or beside one that stands below the legs as high as `height_m` (NaN: unknown): the
-        unit vector (map axes) away from it; outside: the one back to the line.  None elsewhere, and when the
-        drone comes back already."""
+        """Near a keep-out, the way in which it comes to rest counted in, or beside one that stands below the
+        legs as high as `height_m` (NaN: unknown): the unit vector (map axes) away from it; outside: the one
+        back to the line.  None elsewhere, and when the drone comes back already."""
         area, near = self.nearest_keep_out(x_m, y_m), self.nearest_way(x_m, y_m)
         for low in self._low_keep_outs:
             beside = _nearest_of(low, x_m, y_m)
-            is_level = not height_m > low.to_m + KEEP_OUT_CLEARANCE_M
+            is_level = not height_m > low.to_m + KEEP_OUT_HEIGHT_M
             if is_level and 0.0 < beside.distance_m < area.distance_m:
                 area = beside
-        if area.distance_m < KEEP_OUT_CLEARANCE_M and abs(area.distance_m) > 1e-6:
-            bx, by = (x_m - area.x_m) / area.distance_m, (y_m - area.y_m) / area.distance_m
-        elif near.free_m < near.distance_m < math.inf:
+        bx, by = _away(area, x_m, y_m)
+        near_m = NEAR_KEEP_OUT_M + self._rests_after_m(-vx_mps * bx - vy_mps * by)
+        if area.distance_m >= near_m or not (bx or by):
+            if not near.free_m < near.distance_m < math.inf:
+                return None
             bx, by = (near.x_m - x_m) / near.distance_m, (near.y_m - y_m) / near.distance_m
-        else:
-            return None
         return None if vx_mps * bx + vy_mps * by > _BACK_MPS else (bx, by)
+
+    def _rests_after_m(self, speed_mps: float) -> float:
+        """How far a drone still comes that is to stop now; 0 for one that goes away."""
+        speed_mps = max(speed_mps, 0.0)
+        return speed_mps * _BRAKES_AFTER_S + speed_mps**2 / (2.0 * self._brake_mps2)
 
 
 def _free_m(racks: Sequence[KeepOut], a: Node, b: Node, most_m: float) -> float:
@@ -124,6 +134,12 @@ def _free_m(racks: Sequence[KeepOut], a: Node, b: Node, most_m: float) -> float:
         for rack in racks
     )
     return min(most_m, max(min(gaps, default=math.inf) - _BESIDE_SHELF_M, _LEAST_M))
+
+
+def _away(near: Nearest, x_m: float, y_m: float) -> tuple[float, float]:
+    """The unit vector out of an area; of no length where there is none."""
+    gone_m = near.distance_m if abs(near.distance_m) > 1e-6 else math.inf
+    return (x_m - near.x_m) / gone_m, (y_m - near.y_m) / gone_m
 
 
 def _nearest_of(area: KeepOut, x_m: float, y_m: float) -> Nearest:

@@ -15,7 +15,7 @@ from functools import cached_property
 
 from flightd.core.errors import InputError
 from flightd.core.markers import MarkerDictionary, MarkerSet
-from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut, NoWayError, OneWay, Ways
+from flightd.site.ways import KEEP_OUT_HEIGHT_M, KeepOut, NoWayError, OneWay, Ways
 
 ASSUMED_CEILING_M = 2.5
 """The ceiling of a site whose file gives none: half a metre below it, at 2 m, nobody needs to measure one."""
@@ -259,14 +259,14 @@ class Site:
     def is_clear(self, a_m: tuple[float, float, float], b_m: tuple[float, float, float]) -> bool:
         """Whether the box between two points (x, y, height) comes near no keep-out."""
         (ax, ay, ah), (bx, by, bh) = a_m, b_m
-        low_m, high_m = min(ah, bh) - KEEP_OUT_CLEARANCE_M, max(ah, bh) + KEEP_OUT_CLEARANCE_M
+        low_m, high_m = min(ah, bh) - KEEP_OUT_HEIGHT_M, max(ah, bh) + KEEP_OUT_HEIGHT_M
         return not any(area.touches(ax, ay, bx, by) for area in self.between(low_m, high_m).keep_outs)
 
     @property
     def overhead_m(self) -> tuple[float, ...]:
         """The heights that keep clear below each keep-out; those of one that begins on the floor are no
         heights to fly at."""
-        return tuple(area.from_m - KEEP_OUT_CLEARANCE_M for area in self.keep_outs)
+        return tuple(area.from_m - KEEP_OUT_HEIGHT_M for area in self.keep_outs)
 
     def between(self, low_m: float, high_m: float) -> Site:
         """The site as it is for a drone that stays between two heights: of the keep-outs that lie wholly

@@ -25,7 +25,7 @@
     [[blocked]]                  # a line that is not flown at all, for as long as it stands here
     nodes = ["A2", "A3"]
 
-    [[keep_out]]                 # nothing flies within 0.3 m of this rectangle of the floor
+    [[keep_out]]                 # no line within 0.6 m of this rectangle is flown
     x0_m = 4.0
     y0_m = -0.5
     x1_m = 5.0

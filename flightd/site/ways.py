@@ -14,8 +14,14 @@ from dataclasses import dataclass
 
 from flightd.core.errors import InputError
 
-KEEP_OUT_CLEARANCE_M = 0.3
-"""A line this close to a keep-out is not flown: half a drone, and what it may be off the line."""
+BODY_RADIUS_M = 0.30
+"""Half the width of the drone, with its propellers."""
+_OFF_M = 0.3
+"""What the drone's centre may be off its line, or off where it lands; in gusts it is 0.15 to 0.25 m."""
+KEEP_OUT_CLEARANCE_M = BODY_RADIUS_M + _OFF_M
+"""Nearer to a keep-out than this no line is flown, no shelf looked at and no landing aimed for."""
+KEEP_OUT_HEIGHT_M = 0.3
+"""So far above and below a keep-out nothing is flown: half of the drone's height, and what it may be off."""
 
 
 class OneWay(enum.StrEnum):

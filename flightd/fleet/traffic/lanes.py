@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import Final
 
 from flightd.site.site import Site
-from flightd.site.ways import KEEP_OUT_CLEARANCE_M
+from flightd.site.ways import KEEP_OUT_HEIGHT_M
 
 UPRIGHT: Final = -1
 """In place of the quarter of a lane: it leads up or down, or to a pad, under whatever heading."""
@@ -186,7 +186,7 @@ def lanes_of(site: Site, levels_m: Sequence[float] = (1.5,)) -> LaneGraph:
             vertices.append(Vertex(name, node.id, node.x_m, node.y_m, height_m))
     lanes: list[Lane] = []
     for level, height_m in enumerate(levels_m):
-        there = site.between(height_m - KEEP_OUT_CLEARANCE_M, height_m + KEEP_OUT_CLEARANCE_M)
+        there = site.between(height_m - KEEP_OUT_HEIGHT_M, height_m + KEEP_OUT_HEIGHT_M)
         for edge in site.edges:
             if not there.is_closed(edge):
                 a, b = at[edge.a, level], at[edge.b, level]

@@ -259,12 +259,12 @@ HAZARDS: tuple[Hazard, ...] = (
         "corridor_left",
         Trigger.CORRIDOR_LEFT,
         "position further than `hazards.corridor_m` from the open lines of the map, or where a shelf stands"
-        " near a line nearer than 0.35 m to it (0.2 m beside the line are always free), or nearer than 0.15 m"
+        " near a line nearer than 0.35 m to it (0.2 m beside the line are always free), or nearer than 0.45 m"
         " to a keep-out, seen or dead-reckoned, as long as it is known to 0.3 m, and to two thirds of the way"
         " that is free beside the line",
         Action.HOLD,
-        "no setpoint leans further out, nor towards a keep-out within 0.3 m; back to the nearest line, land"
-        " after `mission.lines_land_s`",
+        "no setpoint leans further out, nor towards a keep-out nearer than 0.45 m and the way in which the"
+        " drone comes to rest; back to the nearest line, land after `mission.lines_land_s`",
         _FAST,
     ),
     Hazard(

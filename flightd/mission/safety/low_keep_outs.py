@@ -15,14 +15,13 @@ from flightd.config.mission import MissionConfig
 from flightd.core.types import GridPose
 from flightd.mission.guidance import MissionInputs
 from flightd.site.site import Site
-from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KeepOut
+from flightd.site.ways import BODY_RADIUS_M, KEEP_OUT_CLEARANCE_M, KEEP_OUT_HEIGHT_M, KeepOut
 
-_FREE_M = 0.6
-"""So far beside it is landed: the clearance, and as much again for what the landing may be off."""
 _ASIDE_M = 5.0
 """Not farther: what has to land now should not fly on for long."""
-_ON_LINE_M = 0.6
-"""A line that is farther away is not the one that is flown."""
+_ON_LINE_M, _AS_NEAR_M = 0.6, 0.3
+"""A line that is farther away is not the one that is flown; one that is so little farther than the nearest
+may be."""
 _THERE_M = 0.25
 """So near to the place beside it, it comes down."""
 
@@ -63,7 +62,7 @@ class LowKeepOuts:
         pose = s.pose
         known = pose is not None and s.is_sure(self._params)
         near = _near(self._areas, pose) if pose is not None and known else self._areas
-        return max((area.to_m + KEEP_OUT_CLEARANCE_M for area in near), default=0.0)
+        return max((area.to_m + KEEP_OUT_HEIGHT_M for area in near), default=0.0)
 
     def top_m(self, s: MissionInputs) -> float:
         """The top of what stands where the drone is believed to be; 0 for the floor."""
@@ -73,13 +72,13 @@ class LowKeepOuts:
     def landing_place(self, s: MissionInputs, here_m: tuple[float, float]) -> tuple[float, float]:
         """Where to come down: `here_m`, or the nearest place of its line that is free.  Who is not sure of
         the place stays."""
-        if not self._areas or not s.is_sure(self._params) or not self._covers(here_m, KEEP_OUT_CLEARANCE_M):
+        if not self._areas or not s.is_sure(self._params) or not self._is_near(here_m):
             return here_m
         nearest_m = min((run.away_m(*here_m) for run in self._runs), default=math.inf)
         found = [
             place
             for run in self._runs
-            if run.away_m(*here_m) <= min(nearest_m + KEEP_OUT_CLEARANCE_M, _ON_LINE_M)
+            if run.away_m(*here_m) <= min(nearest_m + _AS_NEAR_M, _ON_LINE_M)
             for place in self._free_of(run, here_m)
         ]
         best = min(found, key=lambda place: math.dist(place, here_m), default=here_m)
@@ -87,31 +86,31 @@ class LowKeepOuts:
 
     def is_on_way(self, s: MissionInputs, place_m: tuple[float, float]) -> bool:
         """It is still over one of them, on its way to a landing place beside it."""
-        if not self._areas or self.top_m(s) == 0.0 or self._covers(place_m, KEEP_OUT_CLEARANCE_M):
+        if not self._areas or self.top_m(s) == 0.0 or self._is_near(place_m):
             return False
         return s.distance_m(place_m) > _THERE_M
 
-    def _covers(self, place_m: tuple[float, float], within_m: float) -> bool:
-        return any(_away_m(area, *place_m) < within_m for area in self._areas)
+    def _is_near(self, place_m: tuple[float, float]) -> bool:
+        return any(_away_m(area, *place_m) < KEEP_OUT_CLEARANCE_M for area in self._areas)
 
     def _free_of(self, run: _Run, here_m: tuple[float, float]) -> Iterator[tuple[float, float]]:
         """The nearest free places of a run before and behind, and where it ends free."""
         along_m, _ = run.of(*here_m)
-        reach_m = _FREE_M + 1e-6
+        reach_m = KEEP_OUT_CLEARANCE_M + 1e-6
         ends = [along_m, run.low_m, run.high_m]
         for area in self._areas:
             low, high = (area.x0_m, area.x1_m) if run.along_x else (area.y0_m, area.y1_m)
             ends += [low - reach_m, high + reach_m]
         for end_m in ends:
             place_m = run.place(end_m)
-            if run.low_m <= end_m <= run.high_m and not self._covers(place_m, _FREE_M):
+            if run.low_m <= end_m <= run.high_m and not self._is_near(place_m):
                 yield place_m
 
 
 def _near(areas: Sequence[KeepOut], pose: GridPose) -> list[KeepOut]:
     """Those that the drone may be over, to two standard deviations of its position."""
     sigma_m = math.sqrt(max(pose.covariance[0], pose.covariance[4], 0.0))
-    reach_m = KEEP_OUT_CLEARANCE_M + 2.0 * sigma_m
+    reach_m = BODY_RADIUS_M + 2.0 * sigma_m
     return [area for area in areas if _away_m(area, pose.x_m, pose.y_m) < reach_m]
 
 

@@ -6,6 +6,7 @@ import math
 
 from flightd.config.schema import Config
 from flightd.control.oscillation import OscillationMonitor
+from flightd.core.geometry import GRAVITY_MPS2
 from flightd.core.types import GridPose, Health
 from flightd.localisation.state_estimator import Estimate
 from flightd.mission.guidance import Guidance, Guide, Warnings
@@ -32,6 +33,9 @@ _KNOWN_M, _KNOWN_SHARE = 0.3, 2.0 / 3.0
 """A position less certain than this (standard deviation), or than this share of the way that is free beside
 the line, cannot tell whether the corridor is left."""
 
+_BRAKES = 2.0
+"""In need speed is lost so much faster than legs plan it: one that ends before a keep-out is not hindered."""
+
 
 class PlausibilityMonitor:
     """Call `step` at each tick for the warnings, `steered` with what the mission then wanted."""
@@ -40,7 +44,9 @@ class PlausibilityMonitor:
         self._judged_above_m = config.mission.expert.steer_above_m
         self._height_share = config.hazards.height_share
         self._ceiling_m = site.ceiling_m - config.hazards.headroom_m
-        self._corridor = Corridor(site, config.hazards.corridor_m)
+        most_mps2 = GRAVITY_MPS2 * math.tan(config.control.max_tilt_rad)
+        brake_mps2 = min(_BRAKES * config.mission.accel_mps2, most_mps2)
+        self._corridor = Corridor(site, config.hazards.corridor_m, brake_mps2)
         self._tick_s = 0.02
         self._off_m = 0.0
         self._doubt = False

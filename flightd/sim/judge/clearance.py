@@ -15,10 +15,8 @@ import numpy as np
 from flightd.sim.judge.motion import TrueMotion, Values
 from flightd.site.rack_depth import rack_body
 from flightd.site.site import Site
-from flightd.site.ways import KeepOut
+from flightd.site.ways import BODY_RADIUS_M, KeepOut
 
-BODY_RADIUS_M = 0.30
-"""Half the width of the drone, with its propellers."""
 BODY_HALF_HEIGHT_M = 0.10
 """From the body's origin down to the feet, and up."""
 _BLOCK = 500

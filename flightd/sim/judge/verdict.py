@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightd.mission.safety.hazard_table import Action
-from flightd.sim.judge.clearance import BODY_RADIUS_M, clearances
+from flightd.sim.judge.clearance import clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, longest_uncontrolled, off_leg_in_air, overshoot
 from flightd.sim.judge.motion import GAP_S
 from flightd.sim.plant.kinematics import OFF_FLOOR_M
 from flightd.site.site import Site
+from flightd.site.ways import BODY_RADIUS_M
 
 OFF_LEG_M = 0.9
 """Further beside its leg it is lost, and nearer where shelves leave less room (`off_leg_bound_m`)."""

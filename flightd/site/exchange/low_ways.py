@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from flightd.site.exchange.listed import listed
 from flightd.site.site import Edge, Site
-from flightd.site.ways import KEEP_OUT_CLEARANCE_M
+from flightd.site.ways import KEEP_OUT_CLEARANCE_M, KEEP_OUT_HEIGHT_M
 
 _HALF_M: Final = 0.01
 """Of the keep-out in the middle of a low way: its clearance reaches no other line."""
@@ -22,7 +22,7 @@ def open_below_m(site: Site, edge: Edge) -> float | None:
         return None
     a, b = site.nodes[edge.a], site.nodes[edge.b]
     over = [area.from_m for area in site.keep_outs if area.touches(a.x_m, a.y_m, b.x_m, b.y_m)]
-    below_m = round(min(over, default=math.inf) - KEEP_OUT_CLEARANCE_M, 6)
+    below_m = round(min(over, default=math.inf) - KEEP_OUT_HEIGHT_M, 6)
     if below_m <= 0.0:
         return None
     return min(below_m, site.ceiling_m if site.ceiling_given else math.inf)
@@ -50,7 +50,7 @@ def low_way_tables(
     for (a, b), height_m in low.items():
         if height_m == ceiling_m:
             continue
-        from_m = round(height_m + KEEP_OUT_CLEARANCE_M, 6)
+        from_m = round(height_m + KEEP_OUT_HEIGHT_M, 6)
         (ax, ay), (bx, by) = nodes[a], nodes[b]
         room = math.dist((ax, ay), (bx, by)) / 2 - _HALF_M > KEEP_OUT_CLEARANCE_M
         if not room or height_m <= 0.0 or from_m >= min(ceiling_m or _HIGHEST_M, _HIGHEST_M):

@@ -62,7 +62,8 @@ def test_a_landing_goes_along_its_line_to_the_nearer_side() -> None:
     assert place == pytest.approx((CONVEYOR.x1_m + 0.6, A.y_m), abs=1e-3)
     assert LOW.is_on_way(inputs, place)
     assert not LOW.is_on_way(at(*place), place)
-    assert LOW.landing_place(at(A.x_m, A.y_m), (A.x_m, A.y_m)) == (A.x_m, A.y_m), "the floor is free there"
+    free = (CONVEYOR.x0_m - 0.65, A.y_m)
+    assert LOW.landing_place(at(*free), free) == free, "the floor is free there"
 
 
 def test_without_a_sure_place_or_a_free_one_near_it_stays_where_it_is() -> None:

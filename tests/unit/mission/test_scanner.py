@@ -292,8 +292,8 @@ def test_re_takes_stay_clear_of_keep_outs() -> None:
     (nearer, *_) = free
     assert abs(nearer.x_m - node.x_m) > 0.1
     assert abs(nearer.y_m - node.y_m) > 0.1
-    beside = KeepOut(nearer.x_m + 0.1, -9.0, nearer.x_m + 0.2, 9.0, 0.0, 3.0)
-    before = KeepOut(-9.0, -0.5, 9.0, -0.4, 0.0, 3.0)
+    beside = KeepOut(node.x_m + 0.65, -9.0, node.x_m + 0.75, 9.0, 0.0, 3.0)
+    before = KeepOut(-9.0, -0.75, 9.0, -0.65, 0.0, 3.0)
     for area in (beside, before):
         assert (
             not replace(SITE, keep_outs=(area,)).between(0.0, 9.0).is_closed(SITE.edges[0]) or area is beside
@@ -301,7 +301,7 @@ def test_re_takes_stay_clear_of_keep_outs() -> None:
         views = retakes(area)
         assert views
         assert all(not area.touches(v.x_m, v.y_m, node.x_m, node.y_m) for v in views)
-    assert retakes(beside, before, replace(beside, x0_m=node.x_m - 0.5, x1_m=node.x_m - 0.4)) != free
+    assert retakes(beside, before, replace(beside, x0_m=node.x_m - 0.75, x1_m=node.x_m - 0.65)) != free
     assert retakes(replace(beside, from_m=5.0, to_m=6.0)) == free, "far above, it is in nobody's way"
 
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from flightd.core.types import AttitudeSetpoint, Event, EventLevel, Phase
-from flightd.sim.judge.clearance import BODY_RADIUS_M, clearances
+from flightd.sim.judge.clearance import clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import score
 from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.judge.verdict import KINDS, OFF_LEG_M, judged, off_leg_bound_m
 from flightd.sim.plant.kinematics import ArmedChange
 from flightd.site.site_file import load_site
-from flightd.site.ways import KeepOut
+from flightd.site.ways import BODY_RADIUS_M, KeepOut
 from tests.rigs.flight_evidence import MS, SITE, S, at, evidence, landed, status
 
 

@@ -15,7 +15,7 @@ from flightd.mission.plan.flight_plan import HeadingPolicy, make_plan
 from flightd.site.layout import LayoutError, lay_out
 from flightd.site.site import Aisle, Pad, Site
 from flightd.site.site_file import parse_site, site_toml
-from flightd.site.ways import KeepOut, NoWayError, OneWay
+from flightd.site.ways import BODY_RADIUS_M, KeepOut, NoWayError, OneWay
 
 POLICY = HeadingPolicy(Heading.ALONG)
 HOME = (Pad("home", "A1", 0.5),)
@@ -81,13 +81,20 @@ def test_what_is_blocked_all_round_is_left_out_and_refused_by_name() -> None:
 
 
 def test_a_keep_out_closes_the_lines_that_it_comes_near_at_its_heights() -> None:
-    near = KeepOut(2.5, 0.2, 3.5, 1.0, from_m=2.0, to_m=3.0)
+    near = KeepOut(2.7, 0.2, 3.3, 1.0, from_m=2.0, to_m=3.0)
     site = ladder(keep_outs=(near,))
     assert site.path("A2", "A3")[1] == "A1"
     assert site.between(0.5, 1.9).path("A2", "A3") == ("A2", "A3")
     assert site.between(1.5, 2.5).path("A2", "A3")[1] == "A1"
-    beside = KeepOut(2.5, 0.4, 3.5, 1.0)
+    beside = KeepOut(2.7, 0.65, 3.3, 1.0)
     assert ladder(keep_outs=(beside,)).path("A2", "A3") == ("A2", "A3")
+
+
+def test_a_line_is_open_only_where_a_gust_beside_it_leaves_the_body_free() -> None:
+    gust_m = 0.26
+    nearer = KeepOut(2.7, BODY_RADIUS_M + gust_m, 3.3, 1.0)
+    assert ladder(keep_outs=(nearer,)).path("A2", "A3")[1] == "A1"
+    assert not ladder(keep_outs=(nearer,)).is_clear((2.0, 0.0, 1.5), (4.0, 0.0, 1.5))
 
 
 def test_home_is_a_pad_to_start_from() -> None:
