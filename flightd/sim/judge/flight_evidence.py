@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from flightd.core.types import AttitudeSetpoint, Event, Phase, Status
+from flightd.core.types import AttitudeSetpoint, Event, EventLevel, Phase, Status
 from flightd.mission.plan.flight_plan import FlightPlan
 from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.plant.kinematics import ON_FLOOR_M, ArmedChange, Kinematics
 from flightd.site.site import Site
+
+_LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
+"""An event of this phase is a warning where the landing is not the plan's."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,16 @@ class FlightEvidence:
         """Where it stands at the end, None where it does not, or never flew."""
         down = len(self.in_air) and self.truth[-1].height_m <= ON_FLOOR_M
         return self.truth[-1] if down else None
+
+    @property
+    def landings(self) -> list[Event]:
+        """When the daemon began to land, in time order."""
+        return [e for e in self.events if e.name == "phase" and _LAND_BEGINS.fullmatch(e.text)]
+
+    @property
+    def landings_in_need(self) -> list[Event]:
+        """Those that were not the plan's, for whatever came."""
+        return [event for event in self.landings if event.level is not EventLevel.INFO]
 
     def truth_at(self, stamp_ns: int) -> Kinematics | None:
         """The first sample not before `stamp_ns`, or the last."""

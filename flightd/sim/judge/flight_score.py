@@ -8,7 +8,6 @@ take-over, whatever phase the daemon claims to be in.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -29,8 +28,6 @@ _AT_NODE_M = 0.5
 _ASIDE_M = 0.4
 """So much farther along the aisle where no other node is as near: from there a shelf is looked at again
 (`scan.aside_m`)."""
-_LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
-"""An event of this phase is a warning where the landing is not the plan's."""
 _CONTROL_GAP_S = 0.5
 """Setpoints further apart leave the drone to itself."""
 _SUNK_M, _SINKS_S = 0.1, 1.0
@@ -155,7 +152,7 @@ def _sinks(motion: TrueMotion, alone: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _landed_error_m(flight: FlightEvidence) -> float | None:
     """From the centre of the pad that it landed on by plan; None where the landing was ordered elsewhere."""
     landed = flight.landed
-    begun = [e for e in flight.events if e.name == "phase" and _LAND_BEGINS.fullmatch(e.text)]
+    begun = flight.landings
     goal = next((status.goal for status in reversed(flight.statuses) if status.phase is Phase.LAND), None)
     pad = next((pad for pad in flight.site.pads if pad.node == goal), None)
     if landed is None or pad is None or not begun or begun[-1].level is not EventLevel.INFO:

@@ -17,6 +17,7 @@ from flightd.sim.plant.kinematics import ON_FLOOR_M, Kinematics
 from flightd.site.site import Site
 
 _AT_PAD_M = 0.5
+_LANDS = frozenset({Action.LAND, Action.STOP})
 _ENDS = {"landed": {"landed", "home"}, "down": {"landed", "home", "completed"}}
 """What is as good an end as the one that is expected."""
 
@@ -24,8 +25,10 @@ _ENDS = {"landed": {"landed", "home"}, "down": {"landed", "home", "completed"}}
 @dataclass(frozen=True, slots=True)
 class HazardVerdict:
     """One row.  `found_s` counts from the first fault (without faults, or where that was there before: from
-    take-off), None when the hazard was not found; `down_s` from there (unfound: from the fault) to the floor,
-    None where row or scenario ask for no landing or it never came down.  `faults` are all that was wrong with
+    take-off), None when the hazard was not found; `down_s` from there (unfound: from the fault) to the floor;
+    where the row asks for no landing at once, from when one began that the plan has not, and where the
+    autopilot takes over and nobody flies, from the fault.  None where no landing followed or the scenario
+    asks for none.  `faults` are all that was wrong with
     the flight, those that the scenario expects left out."""
 
     hazard: str
@@ -57,7 +60,10 @@ def judged_hazard(
     found_s = _found_s(row, flight.events, first_ns, from_ns)
     after = [status.phase for status in flight.statuses if status.stamp_ns >= from_ns]
     lands = expected.ends != "completed" or row.shows_landing
-    down_s = _down_s(row, flight, from_ns, found_s) if lands else None
+    if row.action in _LANDS:
+        down_s = _down_s(row, flight, from_ns, found_s) if lands else None
+    else:
+        down_s = _led_down_s(row, flight, from_ns)
     outcome = _outcome(flight, after[-1] if after else None)
     at_s = _finite(from_ns * 1e-9 - flight.begun_s)
     own = [fault for fault in faults if fault.kind not in _expected(expected)]
@@ -105,10 +111,9 @@ def _found_s(row: Hazard, events: Sequence[Event], first_ns: int, from_ns: int) 
 
 
 def _down_s(row: Hazard, flight: FlightEvidence, from_ns: int, found_s: float | None) -> float | None:
-    """From the finding until it flies no more; None where the row does not land.  Unfound: from the fault,
-    whatever the daemon did then, for nobody may hear it; but what shows only while it lands, from when it
-    began to."""
-    if row.action not in {Action.LAND, Action.STOP} or not len(flight.in_air):
+    """From the finding until it flies no more.  Unfound: from the fault, whatever the daemon did then, for
+    nobody may hear it; but what shows only while it lands, from when it began to."""
+    if not len(flight.in_air):
         return None
     landing = (s.stamp_ns for s in flight.statuses if s.stamp_ns >= from_ns and s.phase is Phase.LAND)
     if row.shows_landing and (landing_ns := next(landing, None)) is not None:
@@ -116,6 +121,19 @@ def _down_s(row: Hazard, flight: FlightEvidence, from_ns: int, found_s: float | 
     else:
         since_s = from_ns * 1e-9 + (found_s or 0.0)
     return max(0.0, float(flight.in_air.stamp_s[-1]) - since_s)
+
+
+def _led_down_s(row: Hazard, flight: FlightEvidence, from_ns: int) -> float | None:
+    """Of a row that does not land at once: from the landing that it led to, if any, or from the fault where
+    the autopilot took over and nobody flies, until it flies no more."""
+    if not len(flight.in_air):
+        return None
+    since_ns = next((event.stamp_ns for event in flight.landings_in_need if event.stamp_ns >= from_ns), None)
+    if row.action is Action.HANDS_OFF:
+        since_ns = None if flight.handed_over else from_ns
+    if since_ns is None:
+        return None
+    return max(0.0, float(flight.in_air.stamp_s[-1]) - since_ns * 1e-9)
 
 
 def _outcome(flight: FlightEvidence, phase: Phase | None) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flightd.core.types import Event, Phase
 from flightd.mission.safety.hazard_table import Action
 from flightd.sim.judge.clearance import clearances
 from flightd.sim.judge.flight_evidence import FlightEvidence
@@ -23,7 +24,7 @@ OVERSHOOT_M = 0.5
 UNCONTROLLED_S = 10.0
 """An autopilot whose companion died must be landing by then."""
 DOWN_S = 20.0
-"""On the floor at most so long after a hazard that asks for landing was found."""
+"""On the floor at most so long after a hazard that asks for landing was found, or led to one."""
 _OFF_PAD_M = 0.5
 _STANDS_M = 0.12
 """A body origin at most this high stands."""
@@ -69,7 +70,7 @@ KINDS = {
     "found_late": "the hazard was found later than the scenario allows, s",
     "other_action": "the daemon did not do what the table of hazards says",
     "other_end": "the flight did not end as the scenario says",
-    "down_late": f"on the floor later than {DOWN_S:g} s after a hazard that asks for landing, s",
+    "down_late": f"down later than {DOWN_S:g} s after a hazard that asks for landing, or led to it, s",
 }
 """What each kind of fault says, with its value."""
 
@@ -171,16 +172,23 @@ def _at_the_floor(flight: FlightEvidence) -> Iterator[JudgedFault]:
     yield from _staying_armed(flight)
     if flight.handed_over:
         return
-    asked = [
-        event for event in flight.events if event.name == "hazard" and event.text.endswith(_ASKS_FOR_LANDING)
-    ]
-    in_air = [e.stamp_ns * 1e-9 for e in asked if e.stamp_ns * 1e-9 < flight.in_air.stamp_s[-1]]
-    if in_air and (down_s := float(flight.in_air.stamp_s[-1]) - in_air[0]) > DOWN_S:
-        yield JudgedFault("down_late", round(in_air[0] - begun_s, 2), round(down_s, 2))
+    asked_s = [event.stamp_ns * 1e-9 for event in _asking_for_landing(flight)]
+    last_s = float(flight.in_air.stamp_s[-1])
+    first_s = min((at_s for at_s in asked_s if at_s < last_s), default=last_s)
+    if last_s - first_s > DOWN_S:
+        yield JudgedFault("down_late", round(first_s - begun_s, 2), round(last_s - first_s, 2))
     last = flight.truth[-1]
     end_s = last.stamp_ns * 1e-9
     if last.height_m > OFF_FLOOR_M:
         yield JudgedFault("stayed_up", round(end_s - begun_s, 2), round(last.height_m, 2))
+
+
+def _asking_for_landing(flight: FlightEvidence) -> list[Event]:
+    """The hazards that ask for a landing at once, the landings that others led to, and where there is no
+    pilot the take-overs by the autopilot's failsafe, which lands."""
+    hazards = [e for e in flight.events if e.name == "hazard" and e.text.endswith(_ASKS_FOR_LANDING)]
+    taken = [e for e in flight.events if e.name == "phase" and f" -> {Phase.PILOT.value}: " in e.text]
+    return [*hazards, *flight.landings_in_need, *taken]
 
 
 def _staying_armed(flight: FlightEvidence) -> Iterator[JudgedFault]:

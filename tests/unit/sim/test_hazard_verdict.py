@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -44,6 +46,40 @@ def test_where_the_daemon_is_dead_it_is_counted_from_its_death() -> None:
     ]
     found = verdict("companion_dead", statuses, begun_s=24)
     assert found.down_s == pytest.approx(66.0, abs=1.1)
+    assert "down_late" in {fault.kind for fault in found.faults}
+
+
+def down(hazard: str, phase: Phase, events: list[Event], ends: Any = "landed") -> HazardVerdict:
+    """Of a flight of a minute whose fault comes after 10 s, and that then is in this phase."""
+    (row,) = (row for row in HAZARDS if row.name == hazard)
+    truth = landed(*(at(second * S) for second in range(1, 61)))
+    flight = replace(evidence(truth, [status(0), status(20 * S, phase)], events), piloted_ns=math.inf)
+    figures = score(flight)
+    expects = Expectation(hazard=hazard, ends=ends, found_s=600)
+    return judged_hazard(row, expects, flight, figures, judged(flight, figures), [10 * S])
+
+
+def test_a_landing_that_a_hold_led_to_has_a_bound_too() -> None:
+    """The camera ends at 10 s; at 12 s it lands, and is down after another 48."""
+    held = Event(11 * S, EventLevel.WARNING, "hazard", "no new pictures: hold")
+    lands = Event(12 * S, EventLevel.WARNING, "phase", "hold -> land: the hazard lasts")
+    found = down("camera_gone", Phase.LAND, [held, lands])
+    assert found.down_s == pytest.approx(48.0)
+    assert [fault.kind for fault in found.faults].count("down_late") == 1
+    soon = Event(45 * S, EventLevel.WARNING, "phase", "hold -> land: the hazard lasts")
+    found = down("camera_gone", Phase.LAND, [held, soon])
+    assert found.down_s == pytest.approx(15.0)
+    assert "down_late" not in {fault.kind for fault in found.faults}
+    planned = Event(12 * S, EventLevel.INFO, "phase", "hover -> land: the route is done")
+    assert down("camera_gone", Phase.LAND, [held, planned]).down_s is None
+
+
+def test_where_its_failsafe_took_over_and_nobody_flies_it_is_counted_from_the_fault() -> None:
+    taken = Event(
+        11 * S, EventLevel.WARNING, "phase", "follow -> pilot: the autopilot's own failsafe took control"
+    )
+    found = down("uplink_lost", Phase.PILOT, [taken], "handed over")
+    assert found.down_s == pytest.approx(50.0)
     assert "down_late" in {fault.kind for fault in found.faults}
 
 
