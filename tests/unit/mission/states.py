@@ -14,7 +14,6 @@ from flightd.config.hazards import HazardConfig, HazardExpert, LossAction
 from flightd.config.scan import ScanConfig
 from flightd.config.schema import Config
 from flightd.core.types import CommandKind, GridPose, LandedState, Phase
-from flightd.mission.guidance import ALL_WELL
 from flightd.mission.machine import FLYING, Intent, State
 from flightd.mission.scan.no_scan import NO_SCAN, AnyScanner
 from flightd.mission.scan.scanner import Scanner
@@ -197,7 +196,12 @@ def sensed(within_s: float = 0.4, **changes: Any) -> Stimulus:
 
 
 def warned(within_s: float = 0.4, **changes: Any) -> Stimulus:
-    return Stimulus(lambda flight: flight.set(warnings=replace(ALL_WELL, **changes)), within_s)
+    return Stimulus(lambda flight: _warn(flight, **changes), within_s)
+
+
+def _warn(flight: Flight, **changes: Any) -> None:
+    """Beside what is warned of already."""
+    flight.set(warnings=replace(flight.inputs.warnings, **changes))
 
 
 def off_the_floor(**changes: Any) -> Stimulus:
@@ -205,7 +209,8 @@ def off_the_floor(**changes: Any) -> Stimulus:
 
     def act(flight: Flight) -> None:
         height_m = max(flight.inputs.height_m, 0.6)
-        flight.set(height_m=height_m, warnings=replace(ALL_WELL, **changes))
+        flight.set(height_m=height_m)
+        _warn(flight, **changes)
 
     return Stimulus(act)
 
@@ -218,8 +223,10 @@ def _lose_lines(flight: Flight) -> None:
 
 
 def sick(params: Config = PARAMS, **changes: Any) -> Stimulus:
-    health = replace(ALL_WELL.health, **changes)
-    return Stimulus(lambda flight: flight.set(warnings=replace(ALL_WELL, health=health)), params=params)
+    def act(flight: Flight) -> None:
+        _warn(flight, health=replace(flight.inputs.warnings.health, **changes))
+
+    return Stimulus(act, params=params)
 
 
 def ordered(kind: CommandKind, node: str = "", within_s: float = 0.04) -> Stimulus:

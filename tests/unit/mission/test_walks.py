@@ -7,8 +7,9 @@ from __future__ import annotations
 import copy
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeAlias
 
 from hypothesis import given, settings
@@ -17,37 +18,40 @@ from hypothesis import strategies as st
 from flightd.config.hazards import LossAction
 from flightd.core.types import CommandKind, Demand, LandedState, Phase
 from flightd.mission.guidance import ALL_WELL
-from flightd.mission.machine import STATES, TABLE, Cause, Intent, State
+from flightd.mission.machine import COMMANDS, STATES, TABLE, Cause, Intent, State
+from flightd.mission.safety.hazard_table import HAZARDS
+from flightd.mission.triggers import Trigger
 from tests.unit.mission.driven import Flight
-from tests.unit.mission.states import PARAMS, flight_of, fresh, losing
+from tests.unit.mission.states import PARAMS, STIMULI, flight_of, fresh, losing
 
 WALKS = int(os.environ.get("FLIGHTD_WALKS", "80"))
 
-SENSED: Mapping[str, Mapping[str, Any]] = {
+ORDERED = frozenset(COMMANDS.values())
+"""What comes as an order, beside what is sensed."""
+HAZARDOUS = {row.trigger for row in HAZARDS if row.trigger is not None} - ORDERED | {Trigger.VANISHED}
+OTHERWISE: Mapping[str, Mapping[str, Any]] = {
     "well": {},
-    "pilot": {"in_control": False},
     "disarmed": {"armed": False, "landed": LandedState.ON_GROUND},
     "standing": {"landed": LandedState.ON_GROUND},
-    "stale": {"telemetry_age_s": 0.2},
-    "silent": {"telemetry_age_s": 0.5},
-    "no height": {"height_m": math.nan},
-    "no lines": {"x_age_s": 9.0, "y_age_s": 9.0, "localised": False},
     "no cross line": {"y_age_s": 9.0},
-    "ground lost": {"ground_silent_s": 9.0},
-    "low": {"battery_frac": 0.15},
-    "critical": {"battery_frac": 0.05},
-    "windy": {"warnings": replace(ALL_WELL, push_mps2=5.0)},
-    "frozen": {"warnings": replace(ALL_WELL, frozen_s=9.0)},
-    "outside": {"warnings": replace(ALL_WELL, outside_m=1.0)},
-    "aisle open": {"aisle_closed": False},
-    "disk full": {"warnings": replace(ALL_WELL, health=replace(ALL_WELL.health, recorder_error="full"))},
+    "not localised": {"x_age_s": 9.0, "y_age_s": 9.0, "localised": False},
     "in doubt": {},
     "elsewhere": {},
 }
+"""What is sensed and no hazard, or not as `STIMULI` has it."""
+SENSED: Mapping[str, Callable[[Flight], None]] = {
+    **{
+        trigger.value: STIMULI[trigger].act
+        for trigger in HAZARDOUS
+        if trigger is not Trigger.POSITION_DOUBTED
+    },
+    **{name: partial(Flight.set, **changes) for name, changes in OTHERWISE.items()},
+}
 USUAL = {
-    "in_control": True, "landed": LandedState.IN_AIR, "telemetry_age_s": 0.0, "height_m": 1.5, "x_age_s": 0.0,
-    "y_age_s": 0.0, "localised": True, "ground_silent_s": 0.0, "battery_frac": 0.95, "warnings": ALL_WELL,
-    "aisle_closed": True,
+    "in_control": True, "in_failsafe": False, "landed": LandedState.IN_AIR, "telemetry_age_s": 0.0,
+    "height_m": 1.5, "climb_mps": 0.0, "x_age_s": 0.0, "y_age_s": 0.0, "localised": True,
+    "ground_silent_s": 0.0, "battery_frac": 0.95, "warnings": ALL_WELL, "aisle_closed": True, "failed": False,
+    "dt_s": 0.02, "clock_error_s": 0.0,
 }  # fmt: skip
 
 SPELLS = st.lists(
@@ -82,8 +86,10 @@ class Walk:
         if follow and flight.inputs.vehicle is not None and not math.isnan(flight.inputs.height_m):
             usual.pop("height_m")
         flight.integrity = 0.5 if "in doubt" in sensed else 1.0
-        changes = usual | {key: value for name in sorted(sensed) for key, value in SENSED[name].items()}
-        flight.set(**changes)
+        flight.set(**usual)
+        flight.heartbeat_s = 0.0
+        for name in sorted(sensed):
+            SENSED[name](flight)
         if "elsewhere" in sensed and flight.inputs.pose is not None:
             flight.set(pose=replace(flight.inputs.pose, x_m=flight.inputs.pose.x_m + 3.0))
         for order in sorted(orders):
@@ -130,7 +136,7 @@ class Walk:
 
     def pilot_wins(self, before: State, after: State) -> None:
         s = self.flight.inputs
-        heard = s.telemetry_age_s < PARAMS.mission.telemetry_hold_s and s.vehicle is not None
+        heard = s.telemetry_age_s + self.flight.heartbeat_s < PARAMS.mission.telemetry_hold_s
         if heard and before.airborne and before.phase is not Phase.RECOVER and s.vehicle is not None:
             assert not s.vehicle.armed or s.vehicle.in_control or after.phase is Phase.PILOT
 
@@ -144,6 +150,7 @@ class Walk:
         landing.order(CommandKind.STOP)
         landing.run(0.02, follow=False)
         assert landing.phase is Phase.LAND
+        landing.heartbeat_s = 0.0
         landing.set(in_control=False, telemetry_age_s=0.0)
         landing.run(0.02, follow=False)
         assert landing.phase.value == "pilot"
