@@ -13,17 +13,21 @@ from flightd.app.simulation.simulation import Simulation
 from flightd.app.simulation.stock_summary import stock_summary
 from flightd.core.topics import Topic
 from flightd.core.tracks import last_known
-from flightd.core.types import AttitudeSetpoint, Event, Status
+from flightd.core.types import AttitudeSetpoint, Event, Phase, Status
 from flightd.mission.safety.hazard_table import HAZARDS
+from flightd.mission.triggers import Trigger
 from flightd.replay.log import FlightLog, read_log
 from flightd.sim.judge.flight_evidence import FlightEvidence
 from flightd.sim.judge.flight_score import FlightScore, score
 from flightd.sim.judge.hazard_verdict import HazardVerdict, judged_hazard
 from flightd.sim.judge.verdict import JudgedFault, judged
 from flightd.sim.plant.kinematics import ArmedChange, Kinematics
+from flightd.sim.scenario.scenario import Scenario
 
 _UNHEARD = frozenset({"companion_dead", "uplink_silent"})
 """Faults during which the autopilot hears no setpoint."""
+_CUT_OFF = _UNHEARD | {"telemetry_silent", "heartbeat_silent"}
+"""Those, and those during which it is not heard."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +71,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
             if not any(since_ns <= sent.stamp_ns < until_ns for since_ns, until_ns in unheard)
         ],
         armed=armed or None,
-        piloted_ns=_piloted_ns(simulation, begun),
+        piloted_ns=_piloted_ns(simulation, begun, flown.messages(Event)),
         lost=_lost(flown),
     )
     figures = score(evidence)
@@ -78,6 +82,7 @@ def judge_flight(simulation: Simulation) -> Judgement:
         codes_wrong=stock["codes_wrong"],
         empty_wrong=stock.get("empty_wrong", 0),
         truth_lost=_lost(world) + evidence.motion.gaps,
+        cut_off=_cut_off(simulation.scenario),
         not_looked_at=stock.get("locations_planned", 0) - stock.get("locations_visited", 0),
     )
     sensors = _sensors(simulation, statuses, truth)
@@ -100,10 +105,21 @@ def _sensors(
     return sensor_summary(simulation, seen, leapt=leapt)
 
 
-def _piloted_ns(simulation: Simulation, begun: Sequence[dict[str, Any]]) -> float:
-    """From when on there is a pilot: always one in another simulator, in ours when he takes the sticks."""
-    came_ns = (note["stamp_ns"] for note in begun if note["kind"] == "pilot")
-    return -math.inf if simulation.truth_url else min(came_ns, default=math.inf)
+def _piloted_ns(simulation: Simulation, begun: Sequence[dict[str, Any]], events: Sequence[Event]) -> float:
+    """From when on there is a pilot: in our simulator when he takes the sticks; in another one always, but
+    where the autopilot itself says that a failsafe of its own took over."""
+    if simulation.truth_url:
+        failsafe = f" -> {Phase.PILOT.value}: {Trigger.FAILSAFE_TOOK.value}"
+        return math.inf if any(e.name == "phase" and failsafe in e.text for e in events) else -math.inf
+    return min((note["stamp_ns"] for note in begun if note["kind"] == "pilot"), default=math.inf)
+
+
+def _cut_off(scenario: Scenario) -> bool:
+    """Whether autopilot and computer do not hear each other: by what a scenario expects, or by its faults
+    where it expects nothing."""
+    if scenario.expect is not None:
+        return scenario.expect.cut_off
+    return any(fault.kind in _CUT_OFF for fault in scenario.fault)
 
 
 def _lasted(notes: Sequence[dict[str, Any]]) -> list[tuple[float, float]]:

@@ -11,6 +11,8 @@ from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.sim.judge.verdict import KINDS, SAFETY_KINDS
 
 _HAZARDS = frozenset(row.name for row in HAZARDS)
+_CUT_OFF = frozenset({"companion_dead", "uplink_lost", "telemetry_lost", "heartbeat_lost"})
+"""What takes the computer, the way to the autopilot or the way from it away."""
 
 
 class Expectation(Section):
@@ -20,6 +22,11 @@ class Expectation(Section):
     found_s: float = Field(1.0, gt=0, le=600)
     ends: Literal["completed", "home", "landed", "down", "handed over"]
     tolerates: tuple[str, ...] = ()
+
+    @property
+    def cut_off(self) -> bool:
+        """Autopilot and computer do not hear each other."""
+        return self.hazard in _CUT_OFF
 
     @field_validator("hazard")
     @classmethod

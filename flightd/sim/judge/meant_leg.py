@@ -25,8 +25,9 @@ _ROUND_A_CORNER_S = 2.0
 """So long after a stop is reached the leg to it still counts: the drone comes to rest, and turns."""
 _BESIDE_M = 1.0
 """A view from further beside its node is none that a scan takes: it is not believed."""
-_WHEREVER = frozenset({Phase.RELOCATE, Phase.RECOVER})
-"""It says itself that it does not know where it is: any line is right."""
+_WHEREVER, _WHEREVER_S = frozenset({Phase.RELOCATE, Phase.RECOVER}), 30.0
+"""It says itself that it does not know where it is: any line is right, for as long as `mission.relocate_s`
+as shipped; who has not found out by then has to land."""
 
 Segment = tuple[float, float, float, float]
 """x and y of both ends, m."""
@@ -61,12 +62,13 @@ def off_leg(site: Site, start: str, statuses: Sequence[Status], motion: TrueMoti
 
 def _legs(site: Site, start: str, statuses: Sequence[Status]) -> Iterator[_Leg]:
     everywhere = tuple(_between(site, edge.a, edge.b) for edge in site.edges)
-    goal, wherever, here = "", False, start
+    goal, wherever, here, lost_s = "", False, start, math.inf
     view: Place | None = None
     way: tuple[Segment, ...] = ()
     lines: tuple[Segment, ...] = ()
     for status in statuses:
-        anywhere = status.phase in _WHEREVER
+        lost_s = min(lost_s, status.stamp_ns * 1e-9) if status.phase in _WHEREVER else math.inf
+        anywhere = lost_s <= status.stamp_ns * 1e-9 < lost_s + _WHEREVER_S
         here = status.node or here  # on a pad it sees no lines, and tells no node
         looks_from = _view(site, status)
         stays = (status.goal, anywhere) == (goal, wherever)

@@ -21,8 +21,9 @@ from flightd.site.ways import BODY_RADIUS_M
 OFF_LEG_M = 0.9
 """Further beside its leg it is lost, and nearer where shelves leave less room (`off_leg_bound_m`)."""
 OVERSHOOT_M = 0.5
-UNCONTROLLED_S = 10.0
-"""An autopilot whose companion died must be landing by then."""
+UNCONTROLLED_S, CUT_OFF_S = 1.0, 10.0
+"""Longer without control is bad; where autopilot and computer do not hear each other, by what the scenario
+does to them, the autopilot must be landing by the second."""
 DOWN_S = 20.0
 """On the floor at most so long after a hazard that asks for landing was found, or led to one."""
 _OFF_PAD_M = 0.5
@@ -52,7 +53,10 @@ KINDS = {
     "hit_keep_out": "the body was in a keep-out, by m",
     "left_leg": f"more than {OFF_LEG_M:g} m, or than shelves leave room, beside the leg that was meant, by m",
     "too_high": f"more than {OVERSHOOT_M:g} m above the commanded height, by m",
-    "out_of_control": f"in the air for more than {UNCONTROLLED_S:g} s without setpoint or landing, s",
+    "out_of_control": (
+        f"in the air for more than {UNCONTROLLED_S:g} s without setpoint or landing ({CUT_OFF_S:g} s where a"
+        " scenario keeps computer and autopilot from hearing each other), s"
+    ),
     "hard_landing": f"touched the floor faster than {_HARD_MPS:g} m/s, m/s",
     "leaned_on_floor": f"commanded to lean by more than {_LEANS_DEG:g} deg while it stands, motors on, deg",
     "stayed_up": "in the air at the end, m above the floor",
@@ -103,10 +107,12 @@ def judged(
     empty_wrong: int = 0,
     not_looked_at: int = 0,
     truth_lost: int = 0,
+    cut_off: bool = False,
 ) -> list[JudgedFault]:
     """All faults of a flight, in the order of `KINDS`.  `not_looked_at`: places that were to be counted,
     and of which it is not even known that they are unreadable or covered; `truth_lost`: what its log lacks,
-    and how often nothing is known of the motion for too long."""
+    and how often nothing is known of the motion for too long; `cut_off`: the scenario keeps autopilot and
+    computer from hearing each other."""
     end_s = float(flight.truth[-1].stamp_ns * 1e-9) - flight.begun_s if flight.truth else 0.0
     counts = {
         "record_lost": flight.lost,
@@ -122,7 +128,7 @@ def judged(
         counts["unanswered"] = not_looked_at
     found = [JudgedFault(kind, _finite(end_s), float(count)) for kind, count in counts.items() if count]
     if len(flight.in_air):
-        found += [*_in_the_air(flight), *_at_the_floor(flight)]
+        found += [*_in_the_air(flight, CUT_OFF_S if cut_off else UNCONTROLLED_S), *_at_the_floor(flight)]
     if (score.landed_error_m or 0.0) > _OFF_PAD_M and score.landed_error_m is not None:
         found.append(JudgedFault("off_pad", _finite(end_s), score.landed_error_m))
     return sorted(found, key=lambda fault: list(KINDS).index(fault.kind))
@@ -135,7 +141,7 @@ def off_leg_bound_m(site: Site) -> float:
     return min(OFF_LEG_M, *rooms_m) if rooms_m else OFF_LEG_M
 
 
-def _in_the_air(flight: FlightEvidence) -> Iterator[JudgedFault]:
+def _in_the_air(flight: FlightEvidence, most_alone_s: float) -> Iterator[JudgedFault]:
     off = off_leg_in_air(flight)
     above = overshoot(flight)
     # a body slides into a rack on the floor, too
@@ -153,7 +159,7 @@ def _in_the_air(flight: FlightEvidence) -> Iterator[JudgedFault]:
             worst = float(values[np.isfinite(values)].max(initial=bound))
             yield JudgedFault(kind, round(first_s, 2), round(worst, 3))
     since_s, alone_s = longest_uncontrolled(flight)
-    if alone_s > UNCONTROLLED_S:
+    if alone_s > most_alone_s:
         yield JudgedFault("out_of_control", round(since_s - flight.begun_s, 2), round(alone_s, 2))
 
 

@@ -72,6 +72,14 @@ def test_while_it_says_that_it_does_not_know_its_place_any_line_is_right() -> No
     assert score(evidence(truth, [status(0, Phase.RELOCATE, goal="A4")])).cross_track_rms_m == 0.0
 
 
+def test_no_line_is_right_for_ever_because_it_says_that_it_does_not_know() -> None:
+    """From the aisle that it is in it has to come down, or to know."""
+    statuses = [status(second * S, Phase.RELOCATE, node="A2", goal="A4") for second in range(45)]
+    truth = [at(second * S, 2.5, 3.0) for second in range(45)]
+    assert "left_leg" not in kinds(evidence(truth[:29], statuses[:29]))
+    assert kinds(evidence(truth, statuses))["left_leg"] == pytest.approx(3.0)
+
+
 def test_who_turns_back_on_the_way_is_still_on_its_leg() -> None:
     """Half-way from A2 to A4 it is sent home; the way from its nearest node begins behind it."""
     statuses = [status(0, node="A2", goal="A4"), status(S, node="A3", goal="A1")]
@@ -176,6 +184,21 @@ def test_a_climb_beyond_the_command_is_told_and_a_descent_to_it_is_none() -> Non
     assert score(evidence(descent, down)).max_overshoot_m == pytest.approx(0.0)
     again = [*descent, at(4 * S, height_m=2.1)]
     assert kinds(evidence(again, down))["too_high"] == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize(
+    ("silent_s", "cut_off", "wrong"),
+    [(1.3, False, False), (3.0, False, True), (3.0, True, False), (12.0, True, True)],
+)
+def test_a_computer_that_is_alive_sends_or_has_it_landed_within_a_second(
+    silent_s: float, cut_off: bool, wrong: bool
+) -> None:
+    truth = [at(stamp * 100 * MS) for stamp in range(200)]
+    sent = [AttitudeSetpoint(stamp * 20 * MS) for stamp in range(1000)]
+    sent = [one for one in sent if not 2 * S <= one.stamp_ns < 2 * S + silent_s * S]
+    flight = evidence(truth, [status(0)], setpoints=sent)
+    faults = {fault.kind for fault in judged(flight, score(flight), cut_off=cut_off)}
+    assert ("out_of_control" in faults) is wrong
 
 
 def test_a_drone_left_to_itself_in_the_air_is_out_of_control_unless_it_is_landing() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from flightd.app.simulation.simulation import Simulation
 from flightd.config.paths import shipped
 from flightd.core.inventory import LocationState, Observation, PlannedLocation
 from flightd.core.topics import Topic
-from flightd.core.types import AttitudeSetpoint, Phase
+from flightd.core.types import AttitudeSetpoint, Event, EventLevel, Phase
 from flightd.sim.scenario.faults import FaultNote
 from flightd.sim.scenario.scenario import Scenario
 from tests.rigs.flight_evidence import S, at, status
@@ -82,6 +83,24 @@ def test_what_reaches_no_autopilot_neither_steers_nor_leans(simulation: Simulati
     found = faults(simulation, kind)
     assert "out_of_control" in found
     assert "leaned_on_floor" not in found
+
+
+@pytest.mark.parametrize(
+    ("took", "judged"),
+    [("the autopilot's own failsafe took control", True), ("the pilot took control", False)],
+)
+def test_in_another_simulator_a_failsafe_is_no_pilot(simulation: Simulation, took: str, judged: bool) -> None:
+    """It is handed over in the air, and never comes down."""
+    with McapRecorder(simulation.truth_log, when_full=wait_for_disk) as log:
+        for stamp_ns in range(0, END_S * S, S // 10):
+            log.record(Topic.TRUTH, stamp_ns, at(stamp_ns, 0.0, height_m=1.6 if stamp_ns > S else 0.1))
+    with McapRecorder(simulation.flight_log, when_full=wait_for_disk) as log:
+        log.record(Topic.STATUS, 0, status(0))
+        told = Event(BEGUN_S * S, EventLevel.WARNING, "phase", f"follow -> pilot: {took}")
+        log.record(Topic.EVENT, told.stamp_ns, told)
+        log.record(Topic.STATUS, told.stamp_ns, status(told.stamp_ns, Phase.PILOT))
+    elsewhere = replace(simulation, truth_url="udp:there")
+    assert ("stayed_up" in {fault.kind for fault in judge_flight(elsewhere).faults}) is judged
 
 
 def test_what_a_computer_sends_counts_again_once_it_has_come_back(simulation: Simulation) -> None:
