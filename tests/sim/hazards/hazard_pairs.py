@@ -2,7 +2,8 @@
 
 python -m tests.sim.hazards.hazard_pairs 500 flies the first five hundred and prints how each ended, then the
 worst distances; exit 1 where one was unsafe.  `--from 7` begins with another one, `--keep DIR` keeps the logs
-of the unsafe ones, `--json FILE` is written for tools.safety_case.
+of the unsafe ones, `--json FILE` is written for tools.safety_case.  `--in-stages` draws both moments within
+one stage of the flight instead (`STAGES`): few that are drawn over the whole of it meet the short ones.
 """
 
 from __future__ import annotations
@@ -31,8 +32,23 @@ from flightd.sim.judge.flight_score import FlightScore
 from flightd.sim.judge.verdict import SAFETY_KINDS, JudgedFault
 from flightd.sim.scenario.scenario import Scenario
 
-_MOMENTS_S = (0.0, 34.0)
+MOMENTS_S: Final[dict[SweepRoute, tuple[float, float]]] = {ALONG: (0.0, 36.0), ACROSS: (0.0, 51.0)}
 """From lift-off until the drone has landed, undisturbed."""
+STAGES: Final[dict[SweepRoute, dict[str, tuple[tuple[float, float], ...]]]] = {
+    ALONG: {
+        "take-off": ((0.0, 3.0),),
+        "at a node": ((7.0, 9.4), (15.7, 18.1)),
+        "in a turn": ((18.1, 23.9),),
+        "above the pad": ((31.5, 36.0),),
+    },
+    ACROSS: {
+        "take-off": ((0.0, 3.0),),
+        "at a node": ((3.5, 5.5), (14.4, 16.8), (24.3, 26.7)),
+        "in a turn": ((5.5, 8.8), (16.8, 20.1), (26.7, 32.5), (37.2, 40.5)),
+        "above the pad": ((46.3, 51.0),),
+    },
+}
+"""When an undisturbed flight is in them, s from lift-off."""
 _LASTS_S = (0.2, 15.0)
 _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     lambda draw: {"kind": "camera_frozen"},
@@ -47,7 +63,16 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
         "kind": "attitude_biased",
         "yaw_deg": round(draw.choice([-1, 1]) * draw.uniform(10, 40), 1),
     },
-    lambda draw: {"kind": "attitude_biased", "roll_deg": round(draw.choice([-1, 1]) * draw.uniform(1, 4), 1)},
+    lambda draw: {
+        "kind": "attitude_biased",
+        draw.choice(["roll_deg", "pitch_deg"]): round(draw.choice([-1, 1]) * draw.uniform(1, 4), 1),
+    },
+    lambda draw: {
+        "kind": "attitude_slow",
+        "share": round(draw.uniform(0.3, 0.9), 2),
+        "damping": round(draw.uniform(0.15, 0.7), 2),
+    },
+    lambda draw: {"kind": "uplink_silent"},
     lambda draw: {"kind": "height_biased", "offset_m": round(draw.uniform(-1.0, 3.0), 2)},
     lambda draw: {"kind": "height_lost"},
     lambda draw: {
@@ -88,7 +113,24 @@ _KINDS: tuple[Callable[[random.Random], dict[str, Any]], ...] = (
     },
     lambda draw: {"kind": "camera_disordered", "delay_s": round(draw.uniform(0.05, 0.2), 2)},
 )
-"""All that a lockstep flight can have, each as strong as the table of hazards claims to bear."""
+"""Each as strong as the table of hazards claims to bear."""
+LEFT_OUT: Final[dict[str, str]] = {
+    "vehicle_reboot": "its motors stop: it falls whatever is done",
+    "order": "over the real link, which needs the clock",
+    **dict.fromkeys(
+        (
+            "detector_hung",
+            "writer_killed",
+            "writer_hung",
+            "disk_full",
+            "loop_stalled",
+            "cpu_taken",
+            "ground_silent",
+        ),
+        "needs the clock, and these fly in lockstep",
+    ),
+}
+"""The other kinds, and why; nor does anything happen to the front camera: nothing is scanned."""
 PASSED: Final[dict[SweepRoute, tuple[str, ...]]] = {ALONG: ("A2", "A3", "A4"), ACROSS: ("B1", "B2")}
 """Where the floor may be bare."""
 _UNSAFE = SAFETY_KINDS | {"record_lost"}
@@ -121,22 +163,26 @@ class FlownPair:
         return f"{self.seed}: {self.faults}: {self.ended}: {words}"
 
 
-def draw_pair(seed: int) -> Scenario:
+def draw_pair(seed: int, *, in_stages: bool = False) -> Scenario:
     """Two different kinds of fault, each for good or for a while, or at a place."""
     draw = random.Random(seed)
-    nodes = PASSED[route_by_seed(seed)]
+    route = route_by_seed(seed)
+    nodes = PASSED[route]
+    windows_s: Sequence[tuple[float, float]] = (MOMENTS_S[route],)
+    if in_stages:
+        windows_s = STAGES[route][draw.choice(sorted(STAGES[route]))]
     faults = []
     for make in draw.sample(_KINDS, 2):
         lasts_s = math.inf if draw.random() < 0.5 else round(draw.uniform(*_LASTS_S), 2)
-        when = {"at_s": round(draw.uniform(*_MOMENTS_S), 2), "duration_s": lasts_s}
+        when = {"at_s": round(draw.uniform(*draw.choice(windows_s)), 2), "duration_s": lasts_s}
         fault = make(draw)
         faults.append(fault | {"at_node": draw.choice(nodes)} if "at_node" in fault else when | fault)
     return Scenario.model_validate({"fault": faults})
 
 
-def fly_pair(seed: int, folder: Path, vehicle: str) -> FlownPair:
+def fly_pair(seed: int, folder: Path, vehicle: str, *, in_stages: bool = False) -> FlownPair:
     """Fly it on the seed's route, with wind and sensors of the same seed."""
-    scenario = draw_pair(seed)
+    scenario = draw_pair(seed, in_stages=in_stages)
     # one that waits on its pad for a fresh battery waits for ever
     options = SimOptions(seed=seed, vehicle=vehicle, settings=["battery.swap=false"])
     simulation = prepare(options, scenario, folder, lambda _: None, sweep_route=route_by_seed(seed).setting)
@@ -161,14 +207,17 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("flights", type=int, nargs="?", default=20)
     parser.add_argument("--from", dest="first", type=int, default=1)
     parser.add_argument("--vehicle", choices=["ardupilot", "px4"], default="ardupilot")
+    parser.add_argument("--in-stages", action="store_true")
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(arguments)
+    if options.json is not None and options.in_stages:
+        parser.error("--json tells of seeds as they are drawn over the whole flight, without --in-stages")
     flown, code = [], flown_code()
     for seed in range(options.first, options.first + options.flights):
         with tempfile.TemporaryDirectory() as made:
             folder = Path(made)
-            pair = fly_pair(seed, folder, options.vehicle)
+            pair = fly_pair(seed, folder, options.vehicle, in_stages=options.in_stages)
             if pair.unsafe and options.keep is not None:
                 shutil.copytree(folder, options.keep / str(seed), dirs_exist_ok=True)
         flown.append(pair)
