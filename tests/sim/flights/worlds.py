@@ -7,6 +7,7 @@ judged.  Each flies its site's whole route: that is what figures of a world are 
 a short look, `--nodes 3` flies to the first three; `--warehouse random` is a random site by each seed.
 `--vehicle px4` and `--set KEY=VALUE` (`--set vehicle.pose_output=none`) are those of `flightd sim`.
 `--off-ms=-50,60` configures a camera's delay of 60 ms wrong by so much; `--json FILE` keeps what was found.
+The last line tells which share of the flights erred by less than 1 and 2 of the sigmas that they told.
 """
 
 from __future__ import annotations
@@ -54,6 +55,17 @@ _TRUE_DELAY_S = 0.06
 _KNOWN_AFTER_S = 20.0
 _DELAY_MS, _ANGLE_DEG = 5.0, 0.3
 """As well as a delay and an angle have to be known by then."""
+_TILTS = "tilt_roll_deg", "tilt_pitch_deg"
+_WITH_SIGMA = (
+    "delay_to_attitude_s",
+    "mount_roll_deg",
+    "mount_pitch_deg",
+    "mount_yaw_deg",
+    *_TILTS,
+    "focal_percent",
+    "height_percent",
+)
+"""What is held against the sigma that the flight tells of it: honest are 68 % within 1, 95 % within 2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +114,8 @@ class Result:
     reason: str
     errors: dict[str, float] = field(default_factory=dict)
     since_leap_s: dict[str, float] = field(default_factory=dict)
+    sigmas: dict[str, float] = field(default_factory=dict)
+    """How many of its own sigmas each estimate was off by then, signed."""
 
     @property
     def is_good(self) -> bool:
@@ -183,13 +197,15 @@ def _flown_by_pictures(planned: PlannedFlight) -> Result:
         except RunError as err:
             ended = str(err)
         judgement = judge_flight(simulation)
-        errors, since_leap_s = {}, dict[str, float]()
+        errors, sigmas, since_leap_s = {}, {}, dict[str, float]()
         if probe.seen is not None:
             truth = _truth(simulation.truth_log)
             leaps = {"camera": simulation.unknowns.camera_leap, "clock": simulation.unknowns.clock_leap}
             since_leap_s = {name: probe.since_s(leap, truth) for name, leap in leaps.items() if leap != NEVER}
             leapt = since_leap_s.get("camera", -math.inf) > 0.0
-            errors = _errors(sensor_summary(simulation, probe.seen, leapt=leapt), probe.tilt_error_deg(truth))
+            tilt_deg = probe.tilt_error_deg(truth)
+            known = sensor_summary(simulation, probe.seen, leapt=leapt)
+            errors, sigmas = _errors(known, tilt_deg), sigmas_off(known, tilt_deg)
     score = judgement.score
     return Result(
         planned=planned,
@@ -203,6 +219,7 @@ def _flown_by_pictures(planned: PlannedFlight) -> Result:
         reason=ended or score.reason,
         errors=errors,
         since_leap_s=since_leap_s,
+        sigmas=sigmas,
     )
 
 
@@ -221,6 +238,21 @@ def _errors(sensors: dict[str, dict[str, float | None]], tilt_deg: tuple[float, 
     told = sensors["estimated"]["tilt_roll_deg"], sensors["estimated"]["tilt_pitch_deg"]
     tilt = max(abs((value or 0.0) - true) for value, true in zip(told, tilt_deg, strict=True))
     return {"delay_ms": off("delay_to_attitude_s", 1e3), "mount_deg": mount, "tilt_deg": tilt}
+
+
+def sigmas_off(
+    sensors: dict[str, dict[str, float | None]], tilt_deg: tuple[float, float]
+) -> dict[str, float]:
+    """Estimated less true in the flight's own sigmas, of all that it tells with a sigma; true tilts are those
+    of then, and the true delay is the one against the attitude."""
+    estimated, sigma = sensors["estimated"], sensors["estimated_sigma"]
+    true = sensors["drawn"] | dict(zip(_TILTS, tilt_deg, strict=True))
+    off = {}
+    for key in _WITH_SIGMA:
+        told, right, one_sigma = estimated[key], true[key], sigma[key]
+        if told is not None and right is not None and one_sigma:
+            off[key] = (told - right) / one_sigma
+    return off
 
 
 def _number(value: float | None) -> float:
@@ -275,6 +307,7 @@ def summary_line(results: Sequence[Result]) -> str:
         f"hover p95 {statistics.fmean(p95) if p95 else math.nan:.3f} m "
         f"(worst {max(p95, default=math.nan):.3f}), landed within {max(landed, default=math.nan):.3f} m"
         f"{_miscounted(results)}{_known_line(results)}"
+        f"{_honesty_line(results)}"
     )
 
 
@@ -302,6 +335,17 @@ def _known_line(results: Sequence[Result]) -> str:
     leapt = sum(result.since_leap_s.get("camera", -math.inf) > 0.0 for result in results)
     late = f" (the delay of {leapt} leapt before)" if leapt else ""
     return f"; of {len(told)} known after {_KNOWN_AFTER_S:.0f} s: " + ", ".join(known) + late
+
+
+def _honesty_line(results: Sequence[Result]) -> str:
+    """Shares of flights whose estimates were then within 1 and 2 of their own sigmas."""
+    shares = []
+    for key in _WITH_SIGMA:
+        off = [abs(result.sigmas[key]) for result in results if key in result.sigmas]
+        if off:
+            within = "/".join(f"{sum(one <= most for one in off) / len(off):.0%}" for most in (1.0, 2.0))
+            shares.append(f"{key} {within}")
+    return f"; within 1/2 of the flight's own sigma: {', '.join(shares)}" if shares else ""
 
 
 def _line(result: Result) -> str:
