@@ -21,9 +21,17 @@ def result(off: dict[str, float]) -> Result:
 
 def test_errors_are_told_in_the_flights_own_sigmas() -> None:
     tilts = {"tilt_roll_deg": 0.5, "tilt_pitch_deg": -0.1}
-    estimated = {**dict.fromkeys(KEYS, 0.3), **tilts, "height_percent": None}
-    sigma = {**dict.fromkeys(KEYS, 0.1), **dict.fromkeys(tilts, 0.2), "height_percent": 1.0}
-    drawn = {**dict.fromkeys(KEYS, 0.1), **dict.fromkeys(tilts, math.nan), "height_percent": 0.0}
+    estimated: dict[str, float | None] = {**dict.fromkeys(KEYS, 0.3), **tilts, "height_percent": None}
+    sigma: dict[str, float | None] = {
+        **dict.fromkeys(KEYS, 0.1),
+        **dict.fromkeys(tilts, 0.2),
+        "height_percent": 1.0,
+    }
+    drawn: dict[str, float | None] = {
+        **dict.fromkeys(KEYS, 0.1),
+        **dict.fromkeys(tilts, math.nan),
+        "height_percent": 0.0,
+    }
     off = sigmas_off({"estimated": estimated, "estimated_sigma": sigma, "drawn": drawn}, (0.1, 0.1))
     assert set(off) == {*KEYS, *tilts}
     assert [off[key] for key in KEYS] == pytest.approx([2.0] * 5)
