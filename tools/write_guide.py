@@ -110,6 +110,13 @@ def _worlds() -> str:
         ("floor: paint that is missing", "paint_gone", 1e2, "% of its length"),
         ("floor: paint on which pallets and drains lie", "paint_covered", 1e2, "% of its length"),
         ("floor: lines that no map has", "false_lines", 1e2, "% of the painted length"),
+        (
+            "floor: long old lines beside the true ones, in the mean",
+            "old_lines",
+            1e2,
+            "% of the painted length",
+        ),
+        ("floor: tape of another colour", "tape", 1e2, "% of the painted length"),
         ("floor: wear, dirt, mirrored lamps and blur, from `default` to `harsh`", "worn_look", 1e2, "%"),
         ("racks: light on each level of a front, from", "darkest_face", 1, "times the usual"),
         ("racks: light on each level of a front, up to", "lightest_face", 1, "times the usual"),

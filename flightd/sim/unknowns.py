@@ -17,6 +17,7 @@ from flightd.sim.appearance import HARSH, Appearance
 from flightd.sim.autopilot.radio import PERFECT, RadioParams
 from flightd.sim.floor.misplaced_lines import misplaced
 from flightd.sim.floor.paint_damage import PaintDamage, drawn_damage
+from flightd.sim.floor.strange_lines import drawn_old_lines, drawn_tapes
 from flightd.sim.leap import NEVER, Leap
 from flightd.sim.plant.airframe import AirframeParams
 from flightd.sim.plant.kinematics import Kinematics
@@ -108,6 +109,10 @@ class Unknowns:
     """Share of it on which pallets and drains lie."""
     false_lines: float = 0.0
     """Length of the stripes that no map has, as a share of it."""
+    old_lines: float = 0.0
+    """Length of the long old lines beside the true ones, as a share of it, in the mean over the floors."""
+    tape: float = 0.0
+    """Length of the tape of other colours, as a share of it."""
     worn_look: float = 0.0
     """How far the floor looks worn, from as configured (0) to the harsh appearance (1)."""
 
@@ -141,7 +146,12 @@ class Unknowns:
 
     def paint_damage(self, painted: Site, seed: int) -> PaintDamage:
         """What the hall did to the floor as it was `painted`."""
-        return drawn_damage(painted, self.paint_gone, self.paint_covered, self.false_lines, seed)
+        damage = drawn_damage(painted, self.paint_gone, self.paint_covered, self.false_lines, seed)
+        return replace(
+            damage,
+            old_lines=drawn_old_lines(painted, self.old_lines, seed, damage.false_lines),
+            tapes=drawn_tapes(painted, self.tape, seed),
+        )
 
     def look(self, configured: Appearance, *, told: bool) -> Appearance:
         """How the floor looks; a look that somebody has `told` stands."""
@@ -249,6 +259,8 @@ class Spread:
     paint_gone: float
     paint_covered: float
     false_lines: float
+    old_lines: float
+    tape: float
     worn_look: float
 
 
@@ -295,6 +307,8 @@ SPREADS = {
         paint_gone=0.01,
         paint_covered=0.0,
         false_lines=0.0,
+        old_lines=0.0,
+        tape=0.0,
         worn_look=0.0,
     ),
     WorldKind.ROUGH: Spread(
@@ -339,6 +353,8 @@ SPREADS = {
         paint_gone=0.05,
         paint_covered=0.03,
         false_lines=0.03,
+        old_lines=0.03,
+        tape=0.03,
         worn_look=0.6,
     ),
 }
@@ -404,6 +420,8 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         paint_gone=most.paint_gone,
         paint_covered=most.paint_covered,
         false_lines=most.false_lines,
+        old_lines=most.old_lines,
+        tape=most.tape,
         worn_look=most.worn_look,
     )
 

@@ -1,8 +1,8 @@
 """What a down camera sees of a floor's paint, as labels: where each line runs in its picture.
 
 A stretch that a gap, a pallet or a drain takes away has no label; one of which they leave a part of the width
-is `minor`.  An old line that no map has is labelled like any other: it is paint, and tells no eye that it is
-not meant.
+is `minor`.  A line that no map has is labelled like any other: it is paint, and tells no eye that it is not
+meant.  An old one that has faded is `minor`.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ _SIGHT = 2.5
 _SAMPLES = 161
 _AROUND = 0.25
 """Share of the picture's size around it in which an edge still tells its direction."""
+_SAME_PX = 1.0
 _ROLLS = 5
 """Rounds in which a row and the time at which it is exposed are brought together."""
 
@@ -75,16 +76,17 @@ class _Piece:
 
 
 def floor_labels(
-    stripes: Sequence[Stripe], hidden: Sequence[Box], sight: FloorSight
+    stripes: Sequence[Stripe], hidden: Sequence[Box], sight: FloorSight, faded: Sequence[Stripe] = ()
 ) -> tuple[list[LabelledLine], list[LabelledNode]]:
     """Lines and nodes of the painted `stripes` where nothing is `hidden`.
 
-    A node in or beside a hidden place, and the end of the paint there, is a `bend`: it may be told or not."""
+    A node in or beside a hidden place, and the end of the paint there, is a `bend`: it may be told or not.
+    So is a node on one of the `faded` stripes, which may be found or not themselves."""
     lines: list[LabelledLine] = []
     bands: list[SceneBand] = []
     cut: list[LabelledNode] = []
     for stripe in stripes:
-        whole = _band(stripe, _Piece(-stripe.length_m / 2, stripe.length_m / 2), sight)
+        whole = _band(stripe, _whole(stripe), sight)
         if whole is None:
             continue
         bands.append(whole)
@@ -100,7 +102,21 @@ def floor_labels(
         LabelledNode(x=node.x, y=node.y, kind="bend") if _is_under(node, covers) else node
         for node in truth_nodes(_scene(tuple(bands), sight))
     ]
+    shown = [band for band in (_band(stripe, _whole(stripe), sight) for stripe in faded) if band is not None]
+    lines += [_minor(line) for band in shown for line in truth_lines(_scene((band,), sight))]
+    if shown:
+        met = truth_nodes(_scene((*bands, *shown), sight))
+        others = [LabelledNode(x=node.x, y=node.y, kind="bend") for node in met if node not in nodes]
+        cut += [node for node in others if not any(_is_near(node, one) for one in nodes)]
     return lines, nodes + cut
+
+
+def _is_near(node: LabelledNode, other: LabelledNode) -> bool:
+    return math.hypot(node.x - other.x, node.y - other.y) < _SAME_PX
+
+
+def _whole(stripe: Stripe) -> _Piece:
+    return _Piece(-stripe.length_m / 2, stripe.length_m / 2)
 
 
 def _minor(line: LabelledLine) -> LabelledLine:

@@ -1,9 +1,9 @@
 """Frames of the simulator's own rough floor, with exact truth: level `rough` of the generated frames.
 
 Each hall is one that a flight in the rough world might meet: a random site, its lines beside their places,
-paint gone, pallets and drains on it, old lines, a worn and dirty look, mirrored lamps, an automatic exposure
-that lags, bands of the mains in the rolling shutter, motion blur and shake.  The lens alone is one without
-distortion: a label is a straight line.
+paint gone, pallets and drains on it, old lines, tape of other colours, a worn and dirty look, mirrored lamps,
+an automatic exposure that lags, bands of the mains in the rolling shutter, motion blur and shake.  The lens
+alone is one without distortion: a label is a straight line.
 """
 
 from __future__ import annotations
@@ -52,6 +52,7 @@ class RoughHall:
         self._damage = damage = self._unknowns.paint_damage(painted, seed)
         self.colour = painted.line_colour
         self._stripes = [*map(_stripe, painted.lines), *damage.false_lines]
+        self._faded = [old.stripe for old in damage.old_lines]
         self._hidden = [*damage.gaps, *damage.pallets, *damage.gratings]
         self._lengths_m = np.array([stripe.length_m for stripe in self._stripes])
         lens = replace(wide_lens(width_px, height_px), distortion=(0.0, 0.0, 0.0, 0.0, 0.0))
@@ -68,7 +69,8 @@ class RoughHall:
         camera.render(moved(flown, -_BEFORE_S), 2 * number)
         shaken = Shaken(self._unknowns.shake_rad, self._seed * FRAMES_A_HALL + number)(flown)
         bgr = camera.render(shaken, 2 * number + 1)
-        lines, nodes = floor_labels(self._stripes, self._hidden, FloorSight(self._camera, shaken))
+        sight = FloorSight(self._camera, shaken)
+        lines, nodes = floor_labels(self._stripes, self._hidden, sight, self._faded)
         lens = self._camera.lens
         label = LabelledImage(
             file="",
@@ -108,7 +110,7 @@ class RoughHall:
     def _looked_at(self, rng: np.random.Generator) -> tuple[float, float]:
         """A point on a line, or where something is wrong with the paint."""
         damage = self._damage
-        wrong = [*self._hidden, *(stripe.box() for stripe in damage.false_lines)]
+        wrong = [*self._hidden, *(one.box() for one in (*damage.false_lines, *self._faded))]
         if wrong and rng.random() < _DAMAGED:
             x0, y0, x1, y1 = wrong[int(rng.integers(len(wrong)))]
             return (x0 + x1) / 2, (y0 + y1) / 2

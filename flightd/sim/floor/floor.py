@@ -70,6 +70,7 @@ class Floor:
         self._marks = FloorMarks(site, look, seed)
         self._signs = FloorSigns(site)
         self._strokes: list[Box | Stripe] = [*map(stroke_box, site.lines), *damage.false_lines]
+        self._old, self._tapes = damage.old_lines, damage.tapes
         self._mats = [
             (x_m - half, y_m - half, x_m + half, y_m + half)
             for pad in site.pads
@@ -146,30 +147,49 @@ class Floor:
             _lay(colour, _linear(_UPRIGHT_SRGB), steel)
 
     def _lay_paint(self, colour: Floats, patch: Patch, mats: Floats | None) -> None:
+        """Tape, old lines and, over both, the paint."""
+        for tape in self._tapes:
+            stuck = self._cover(patch, [tape.stripe], None)
+            if stuck is not None:
+                _lay(colour, self._dirty(_linear(paint_srgb(tape.colour)), patch), stuck)
         ragged = None
         if self._look.ragged_m > 0.0:
             ragged = self._look.ragged_m * self._noise.mix(patch, "edge", {0.15: 0.5, 0.02: 0.4, 0.006: 0.6})
+        for old in self._old:
+            faded = self._cover(patch, [old.stripe], ragged)
+            if faded is not None:
+                faded *= np.float32(old.left) * self._kept(patch, mats)
+                _lay(colour, self._dirty(self._paint, patch), faded)
         cover = self._cover(patch, self._strokes, ragged)
         if cover is None:
             return
-        if self._look.wear > 0.0:
-            rubbed = self._noise.mix(patch, "rubbed", {0.9: 0.5, 0.3: 0.45, 0.09: 0.35})
-            chips = self._noise.mix(patch, "chips", {0.04: 0.35, 0.015: 0.5, 0.006: 0.5, 0.003: 0.4})
-            threshold = _WEAR_AT_NONE - _WEAR_PER_SHARE * self._look.wear
-            gone = np.clip((rubbed + chips - threshold) * 2.5, 0.0, 0.92)
-            if mats is not None:  # the mat is newer than the floor
-                gone *= 1.0 - 0.8 * mats
-            cover *= 1.0 - gone
+        cover *= self._kept(patch, mats)
         gaps = self._cover(patch, self._gaps, None)
         if gaps is not None:
             cover *= 1.0 - gaps
-        paint = np.broadcast_to(self._paint, colour.shape).copy()
+        _lay(colour, self._dirty(self._paint, patch), cover)
+
+    def _kept(self, patch: Patch, mats: Floats | None) -> Floats | np.float32:
+        """Share of the paint that wear leaves."""
+        if not self._look.wear > 0.0:
+            return np.float32(1.0)
+        rubbed = self._noise.mix(patch, "rubbed", {0.9: 0.5, 0.3: 0.45, 0.09: 0.35})
+        chips = self._noise.mix(patch, "chips", {0.04: 0.35, 0.015: 0.5, 0.006: 0.5, 0.003: 0.4})
+        threshold = _WEAR_AT_NONE - _WEAR_PER_SHARE * self._look.wear
+        gone: Floats = np.clip((rubbed + chips - threshold) * 2.5, 0.0, 0.92)
+        if mats is not None:  # the mat is newer than the floor
+            gone *= 1.0 - 0.8 * mats
+        return 1.0 - gone
+
+    def _dirty(self, reflectance: Floats, patch: Patch) -> Floats:
+        """Paint or tape of a colour below the floor's film of dirt."""
+        paint = np.broadcast_to(reflectance, (patch.size, patch.size, 3)).copy()
         if self._look.dirt > 0.0:
             film = self._noise.mix(patch, "film", {1.3: 0.3, 0.3: 0.3, 0.07: 0.25, 0.02: 0.2, 0.005: 0.25})
             grey = np.clip(0.22 + 0.25 * film, 0.0, 0.8) * np.float32(self._look.dirt)
             paint *= (1.0 - 0.35 * grey)[..., None]
             paint += (_linear(_CONCRETE_SRGB) * 0.55 - paint) * (0.6 * grey)[..., None]
-        colour += (paint - colour) * cover[..., None]
+        return paint
 
     def _cover(self, patch: Patch, shapes: Sequence[Box | Stripe], ragged: Floats | None) -> Floats | None:
         """Share of each texel inside any of the shapes, their edges moved outward by `ragged` metres;

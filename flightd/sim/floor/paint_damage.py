@@ -46,13 +46,33 @@ class Stripe:
 
 
 @dataclass(frozen=True, slots=True)
+class OldLine:
+    """What is left of a line that was painted anew beside its old place."""
+
+    stripe: Stripe
+    left: float
+    """Share of the paint that still covers the floor."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tape:
+    """Tape of another colour than the paint's, for other purposes."""
+
+    stripe: Stripe
+    colour: str
+
+
+@dataclass(frozen=True, slots=True)
 class PaintDamage:
-    """Floor without paint (`gaps`), what lies on it, and stripes of its colour that no map has."""
+    """Floor without paint (`gaps`), what lies on it, and what is on it that no map has: stripes of the
+    paint's colour, long old lines beside the true ones, tape of other colours."""
 
     gaps: tuple[Box, ...] = ()
     pallets: tuple[Box, ...] = ()
     gratings: tuple[Box, ...] = ()
     false_lines: tuple[Stripe, ...] = ()
+    old_lines: tuple[OldLine, ...] = ()
+    tapes: tuple[Tape, ...] = ()
 
 
 UNDAMAGED = PaintDamage()
@@ -71,9 +91,40 @@ def painted_m(lines: Iterable[PaintedLine], within: Box = _EVERYWHERE) -> float:
 def stroke_box(line: PaintedLine, beside_m: float = 0.0) -> Box:
     """The painted rectangle, square at its ends, `beside_m` wider to either side."""
     half_m = line.width_m / 2 + beside_m
-    if _runs_along_x(line):
+    if runs_along_x(line):
         return line.x0_m, line.y0_m - half_m, line.x1_m, line.y0_m + half_m
     return line.x0_m - half_m, line.y0_m, line.x0_m + half_m, line.y1_m
+
+
+def runs_along_x(line: PaintedLine) -> bool:
+    """Whether it runs along x; else along y."""
+    return line.y0_m == line.y1_m
+
+
+def meets(box: Box, others: Iterable[Box]) -> bool:
+    """Whether a box overlaps any other."""
+    return any(
+        box[0] < other[2] and box[2] > other[0] and box[1] < other[3] and box[3] > other[1]
+        for other in others
+    )
+
+
+def lies_in(box: Box, bounds: Box) -> bool:
+    """Whether a box lies within another, whole."""
+    return box[0] >= bounds[0] and box[1] >= bounds[1] and box[2] <= bounds[2] and box[3] <= bounds[3]
+
+
+def around_pads(site: Site) -> list[Box]:
+    """What lies within 0.5 m of the centre of a pad or of its node: nothing is wrong with the lines there."""
+    places = [(site.pad_centre(pad), site.nodes[pad.node]) for pad in site.pads]
+    centres = [at for centre, node in places for at in (centre, (node.x_m, node.y_m))]
+    return [_box(x_m, y_m, _PAD_CLEAR_M, _PAD_CLEAR_M) for x_m, y_m in centres]
+
+
+def rack_boxes(site: Site) -> list[Box]:
+    """The floor on which racks stand."""
+    bodies = [rack_body(site, shelf) for shelf in site.shelves]
+    return [(body.x0_m, body.y0_m, body.x1_m, body.y1_m) for body in bodies]
 
 
 def drawn_damage(site: Site, gone: float, covered: float, false: float, seed: int) -> PaintDamage:
@@ -101,16 +152,12 @@ class _Hall:
         self._lines = site.lines
         self._lengths_m = [painted_m([line]) for line in site.lines]
         self._bounds = site.bounds()
-        bodies = [rack_body(site, shelf) for shelf in site.shelves]
-        self._shelves = [(body.x0_m, body.y0_m, body.x1_m, body.y1_m) for body in bodies]
-        self._taken: list[Box] = []
+        self._shelves = rack_boxes(site)
+        self._taken = around_pads(site)
         self._pads: list[Box] = []
         for pad in site.pads:
-            x_m, y_m = site.pad_centre(pad)
-            node, half_m = site.nodes[pad.node], pad.size_m / 2 + _PALLET_CLEAR_M
-            self._pads.append(_box(x_m, y_m, half_m, half_m))
-            self._taken.append(_box(x_m, y_m, _PAD_CLEAR_M, _PAD_CLEAR_M))
-            self._taken.append(_box(node.x_m, node.y_m, _PAD_CLEAR_M, _PAD_CLEAR_M))
+            half_m = pad.size_m / 2 + _PALLET_CLEAR_M
+            self._pads.append(_box(*site.pad_centre(pad), half_m, half_m))
 
     def lay_covers(self, wished_m: float) -> tuple[tuple[Box, ...], tuple[Box, ...]]:
         """Pallets and gratings that hide so many metres of line, to about 0.1 m."""
@@ -124,7 +171,7 @@ class _Hall:
             box = self._pallet() if is_pallet else self._grating()
             hidden_m = painted_m(self._lines, box)
             away = [*self._taken, *self._shelves, *(self._pads if is_pallet else ())]
-            if _LEAST_HIDDEN_M <= hidden_m <= left_m + _LEAST_HIDDEN_M and not _meets(box, away):
+            if _LEAST_HIDDEN_M <= hidden_m <= left_m + _LEAST_HIDDEN_M and not meets(box, away):
                 (pallets if is_pallet else gratings).append(box)
                 self._taken.append(box)
                 left_m -= hidden_m
@@ -143,10 +190,10 @@ class _Hall:
             start_m = self._rng.uniform(0.0, length_m - long_m)
             box = (
                 (x0_m + start_m, y0_m, x0_m + start_m + long_m, y1_m)
-                if _runs_along_x(line)
+                if runs_along_x(line)
                 else (x0_m, y0_m + start_m, x1_m, y0_m + start_m + long_m)
             )
-            if not _meets(box, self._taken):
+            if not meets(box, self._taken):
                 gaps.append(box)
                 self._taken.append(box)
                 left_m -= painted_m(self._lines, box)
@@ -170,10 +217,10 @@ class _Hall:
                 askew_rad + (0.0 if along_x else math.pi / 2),
             )
             alongside = (
-                stroke_box(line, _ALONGSIDE_M) for line in self._lines if _runs_along_x(line) is along_x
+                stroke_box(line, _ALONGSIDE_M) for line in self._lines if runs_along_x(line) is along_x
             )
             box = stripe.box()
-            if _lies_in(box, self._bounds) and not _meets(box, [*self._taken, *self._shelves, *alongside]):
+            if lies_in(box, self._bounds) and not meets(box, [*self._taken, *self._shelves, *alongside]):
                 stripes.append(stripe)
                 self._taken.append(box)
                 left_m -= stripe.length_m
@@ -183,7 +230,7 @@ class _Hall:
         (x_m, y_m), line = self._place()
         size_x_m, size_y_m = _PALLET_M if self._rng.random() < 0.5 else _PALLET_M[::-1]
         aside_m = self._rng.uniform(-0.3, 0.3)
-        dx_m, dy_m = (0.0, aside_m) if _runs_along_x(line) else (aside_m, 0.0)
+        dx_m, dy_m = (0.0, aside_m) if runs_along_x(line) else (aside_m, 0.0)
         return _box(x_m + dx_m, y_m + dy_m, size_x_m / 2, size_y_m / 2)
 
     def _grating(self) -> Box:
@@ -192,7 +239,7 @@ class _Hall:
         lies_along, aside_m = self._rng.random() < 0.5, self._rng.uniform(-0.2, 0.2)
         if lies_along:
             aside_m = 0.0
-        if _runs_along_x(line) is lies_along:
+        if runs_along_x(line) is lies_along:
             return _box(x_m + aside_m, y_m, half_m[0], half_m[1])
         return _box(x_m, y_m + aside_m, half_m[1], half_m[0])
 
@@ -209,20 +256,5 @@ class _Hall:
         return (x_m, line.y0_m + at * (line.y1_m - line.y0_m)), line
 
 
-def _runs_along_x(line: PaintedLine) -> bool:
-    return line.y0_m == line.y1_m
-
-
 def _box(x_m: float, y_m: float, half_x_m: float, half_y_m: float) -> Box:
     return x_m - half_x_m, y_m - half_y_m, x_m + half_x_m, y_m + half_y_m
-
-
-def _meets(box: Box, others: Iterable[Box]) -> bool:
-    return any(
-        box[0] < other[2] and box[2] > other[0] and box[1] < other[3] and box[3] > other[1]
-        for other in others
-    )
-
-
-def _lies_in(box: Box, bounds: Box) -> bool:
-    return box[0] >= bounds[0] and box[1] >= bounds[1] and box[2] <= bounds[2] and box[3] <= bounds[3]

@@ -1,6 +1,7 @@
 """The painted floor and the camera: no seams, one floor at every resolution, lens and blur that add up."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -15,7 +16,7 @@ from flightd.core.geometry import Lens
 from flightd.sim.appearance import CLEAN, DEFAULT, HARSH, Appearance, preset
 from flightd.sim.floor.floor import Floor
 from flightd.sim.floor.lighting import Lighting
-from flightd.sim.floor.paint_damage import UNDAMAGED, PaintDamage, Stripe
+from flightd.sim.floor.paint_damage import UNDAMAGED, OldLine, PaintDamage, Stripe, Tape
 from flightd.sim.floor.texture import Patch
 from flightd.sim.sensors.camera_effects import blur_kernel
 from flightd.sim.sensors.optics import wide_lens
@@ -139,6 +140,25 @@ def test_a_false_line_is_painted_like_a_true_one(turn_deg: float) -> None:
     for at_m, beside_m in ((0.0, 0.06), (0.0, -0.06), (0.43, 0.0), (-0.43, 0.0)):
         x_m, y_m = 3.6 + at_m * along[0] - beside_m * along[1], 0.6 + at_m * along[1] + beside_m * along[0]
         assert tone(damaged, x_m, y_m) == tone(floor(CLEAN), x_m, y_m)
+
+
+def test_an_old_line_is_fainter_paint_and_the_true_one_lies_on_it() -> None:
+    old = OldLine(Stripe(3.6, 0.12, 1.0, 0.08, 0.0), 0.5)
+    damaged, clean = floor(CLEAN, PaintDamage(old_lines=(old,))), floor(CLEAN)
+    paint, concrete = tone(clean, 3.6, 0.0), tone(clean, 3.6, 0.12)
+    faint = tone(damaged, 3.6, 0.12)
+    assert concrete[1] + 30.0 < faint[1] < paint[1] - 30.0
+    assert tone(damaged, 3.6, 0.0) == paint
+    assert tone(damaged, 4.2, 0.12) == concrete
+    assert tone(floor(CLEAN, PaintDamage(old_lines=(replace(old, left=0.9),))), 3.6, 0.12)[1] > faint[1]
+
+
+def test_tape_has_its_own_colour_and_lies_below_the_paint() -> None:
+    tape = Tape(Stripe(3.6, 0.0, 0.8, 0.06, math.pi / 2), "red")
+    damaged, clean = floor(CLEAN, PaintDamage(tapes=(tape,))), floor(CLEAN)
+    blue, green, red = damaged.paint(Patch(3.58, 0.2, 0.001, 40)).astype(float).mean(axis=(0, 1))
+    assert (red, green, blue) == pytest.approx((176.0, 40.0, 38.0), abs=3.0)
+    assert tone(damaged, 3.6, 0.0) == tone(clean, 3.6, 0.0)
 
 
 def test_a_grating_keeps_its_tone_from_afar() -> None:

@@ -69,6 +69,14 @@ def test_a_line_that_no_map_has_is_paint_like_any_other() -> None:
     assert nodes == ["end", "end"]
 
 
+def test_a_faded_line_and_what_meets_it_may_be_found_or_not() -> None:
+    faded = [Stripe(0.1, 0.0, 1.0, 0.06, math.pi / 2), Stripe(0.0, 0.3, 8.0, 0.06, 0.0)]
+    lines, nodes = floor_labels([GUIDE], (), FloorSight(CAMERA, ABOVE), faded)
+    assert [line.grade for line in lines] == ["main", "minor", "minor"]
+    assert {node.kind for node in nodes} == {"bend"}
+    assert len(nodes) == 4, "two crossings, two ends"
+
+
 def test_a_crossing_below_a_pallet_may_be_told_or_not() -> None:
     across = Stripe(0.0, 0.0, 1.2, 0.08, math.pi / 2)
     assert labels_of(GUIDE, across)[1] == ["+", "end", "end"]
