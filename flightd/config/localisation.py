@@ -26,8 +26,8 @@ class LocalisationExpert(Section):
         3.0,
         ge=0,
         le=20,
-        description="way (a hover counts as 0.1 m/s) over which features of the floor may carry the position "
-        "on without a line across an axis",
+        description="way (a hover counts as 0.1 m/s) over which features of the floor, or a line that the "
+        "map lacks, may carry the position on without a line across an axis",
     )
     most_places: int = Field(48, ge=4, le=1000, description="places that are told apart at once, at most")
     slip: float = Field(

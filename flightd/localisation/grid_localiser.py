@@ -42,6 +42,7 @@ from flightd.localisation.observation_model import (
 )
 from flightd.localisation.position_fixes import FixBook
 from flightd.localisation.safe_moves import Reach
+from flightd.localisation.seen_beside import SeenBeside
 from flightd.site.nearest_node import NodeIndex
 from flightd.site.painted_lines import PaintMap
 from flightd.site.site import Site
@@ -98,6 +99,7 @@ class GridLocaliser:
         self._fixes = FixBook(site)
         self._approached = Approached(), Approached()
         self._runs = LineRuns(), LineRuns()
+        self._beside = SeenBeside(), SeenBeside()
         self._judged: tuple[list[float], list[float]] = ([], [])
         self._seen_ns = [0, 0]
         self._told_ns = [0, 0]
@@ -116,8 +118,8 @@ class GridLocaliser:
 
     @property
     def told_ns(self) -> tuple[int, int]:
-        """When x, and y, was last told: by a line of the map, or by features of the floor that carried it on
-        for no more than `by_features_m`; 0 before the first line."""
+        """When x, and y, was last told: by a line of the map, or by what else of the floor carried it on for
+        no more than `by_features_m`; 0 before the first line."""
         return self._told_ns[0], self._told_ns[1]
 
     @property
@@ -171,9 +173,12 @@ class GridLocaliser:
         due = now_ns - self._judge_ns >= _JUDGE_NS
         for axis, velocity in ((0, tracks.vx_mps), (1, tracks.vy_mps)):
             lines = tracks.across_y if axis else tracks.across_x
-            carried = now_ns - tracks.features_ns[axis] < _CARRIED_NS
+            self._beside[axis].step(lines)
+            carried = now_ns - self._followed_ns(axis, tracks) < _CARRIED_NS
             places.move(axis, velocity, tracks.velocity_sigma_mps[axis], dt_s, carried=carried)
             self._match(axis, lines, reach_m, due)
+            if due:
+                self._part(axis, lines)
             places.settle(axis, lines)
             self._carry(axis, tracks, dt_s)
             self._approached[axis].step(lines, _BELOW * height_m)
@@ -200,10 +205,23 @@ class GridLocaliser:
 
     # The parts of a step
 
+    def _part(self, axis: int, tracks: Sequence[TrackedLine]) -> None:
+        """Tell the places which tracks are surely two lines."""
+        known = {track.id: track for track in tracks if self._places.knows(axis, track.id)}
+        for one, other in self._beside[axis].pairs():
+            if one in known and other in known:
+                self._places.part(axis, known[one], known[other])
+
+    def _followed_ns(self, axis: int, tracks: TrackSet) -> int:
+        """When the floor itself last told the motion across the axis: its features, or a line that was seen
+        to keep its distance from another one, be it of the map or not."""
+        lines = tracks.across_y if axis else tracks.across_x
+        return max(tracks.features_ns[axis], self._beside[axis].told_ns(lines))
+
     def _carry(self, axis: int, tracks: TrackSet, dt_s: float) -> None:
-        """Count how far features of the floor have carried the position on since a line told it.  Once
-        neither tells it, only a line does again."""
-        seen_ns, features_ns = self._seen_ns[axis], tracks.features_ns[axis]
+        """Count how far the floor has carried the position on since a line of the map told it.  Once neither
+        tells it, only a line of the map does again."""
+        seen_ns, features_ns = self._seen_ns[axis], self._followed_ns(axis, tracks)
         if tracks.pads_ns - seen_ns < SEEN_NS:
             self._carried_m[axis] = 0.0
         elif tracks.stamp_ns - max(self._told_ns[axis], seen_ns) > _CARRIED_NS:
@@ -366,6 +384,7 @@ class GridLocaliser:
         places = self._places
         x, y = (float(v) for v in places.at_m[places.best])
         sx, sy = (float(v) for v in places.sigma_m[places.best])
+        told_x_m, told_y_m = places.spread(_CELL_M, _LEAST)
         node = self._nodes.node(x, y)
         near = np.abs(places.at_m - places.at_m[places.best]).max(axis=1) < _CELL_M
         same = float(places.weights[near].sum())
@@ -380,6 +399,6 @@ class GridLocaliser:
             vx_mps=tracks.vx_mps,
             vy_mps=tracks.vy_mps,
             height_m=height_m,
-            covariance=(sx**2, 0.0, 0.0, 0.0, sy**2, 0.0, 0.0, 0.0, tracks.yaw_sigma_rad**2),
+            covariance=(told_x_m**2, 0.0, 0.0, 0.0, told_y_m**2, 0.0, 0.0, 0.0, tracks.yaw_sigma_rad**2),
             integrity=same * self._nodes.inside(node.id, sx, sy),
         )

@@ -270,6 +270,31 @@ class Places:
         matches[track.id][size:], matches[other.id][size:] = lines, _FALSE
         self._found[axis][track.id][size:] = np.stack([residuals[:, 1], sigma], axis=1)
 
+    def part(self, axis: int, track: TrackedLine, other: TrackedLine) -> None:
+        """The two are surely two lines: where one is the map's the other is none, unless the map has another
+        one nearer to where it lies.  However long the first is out of sight, or its paint gone: the other one
+        does not become it."""
+        at_m = self._paint.axes[axis].at_m
+        for one, its in ((track, other), (other, track)):
+            mine, theirs = self._matches[axis][one.id], self._matches[axis][its.id]
+            rows = np.flatnonzero((mine == _UNMATCHED) & (theirs >= 0))
+            if not len(rows):
+                continue
+            line_m = at_m[theirs[rows]]
+            lies_m = line_m + one.offset_m - its.offset_m
+            nearest = np.abs(lies_m[:, None] - at_m[None, :]).argmin(axis=1)
+            mine[rows[at_m[nearest] == line_m]] = _FALSE
+
+    def spread(self, within_m: float, least: float) -> tuple[float, float]:
+        """Sigmas of x and y at the likeliest place, with what the others within so much of it, `least` likely
+        or more, differ: it may be any of them."""
+        off_m = self.at_m - self.at_m[self.best]
+        near = (np.abs(off_m).max(axis=1) < within_m) & (self.weights >= least)
+        weights = np.where(near, self.weights, 0.0)
+        among = weights @ np.where(near[:, None], off_m, 0.0) ** 2 / max(float(weights.sum()), _TINY)
+        x_m, y_m = np.sqrt(self.sigma_m[self.best] ** 2 + among).tolist()
+        return x_m, y_m
+
     def _covered(self, axis: int, lines: AxisLines, track: TrackedLine, reach_m: float) -> Flags:
         """(N, L): the map line has paint where the track was seen; by the drone's own place and `reach_m`
         when the visible part is not known."""
