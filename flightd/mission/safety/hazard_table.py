@@ -71,7 +71,8 @@ HAZARDS: tuple[Hazard, ...] = (
         Trigger.PILOT_TOOK,
         "the autopilot is in a mode that was not commanded",
         Action.HANDS_OFF,
-        "silence at once, for good",
+        "silence at once, for good; an ArduPilot that is left for a second in GUIDED_NOGPS, where nobody"
+        " flies it then, gets no more heartbeats and lands by itself; in any other mode they go on",
         _FAST,
     ),
     Hazard(

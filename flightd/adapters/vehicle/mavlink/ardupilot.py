@@ -122,6 +122,11 @@ class ArduPilotVehicle(MavlinkVehicle):
     def keeps_climb(self) -> bool:
         return self._thrust_is_raw() is False
 
+    def _holds_failsafe(self) -> bool:
+        """Not in GUIDED_NOGPS once nobody flies it, for nothing steers it there but our setpoints; in GUIDED
+        a ground station may."""
+        return self.flying_mode != GUIDED_NOGPS or not self._modes.is_forsaken
+
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:
         raw = self._thrust_is_raw()
         if self._flies_raw if raw is None else raw:  # it is read anew in the air: it is what it was

@@ -32,6 +32,11 @@ _LOG = logging.getLogger(__name__)
 _SILENT_NS = 3_000_000_000
 _TELLING_NS = 500_000_000
 """An attitude this young shows that the line is alive, whatever has become of the heartbeats."""
+_FORSAKEN_NS = 1_000_000_000
+"""In the mode in which it obeys us, with our hands off, for so long, nobody flies it: a pilot who passes
+through that mode does not stay."""
+_SEEN_NS = 300_000_000
+"""A mode told longer ago may be another by now: less than what the failsafe for our heartbeats waits for."""
 _STEP_S = 0.05
 _ARM_PAUSE_S = 1.0
 _MODE_PAUSE_S = 0.5
@@ -119,6 +124,7 @@ class ModeArmingManager:
         self._reasons: deque[tuple[int, str]] = deque(maxlen=4)
         self._demand = Demand.STANDBY
         self._was_armed = False
+        self._unflown_since_ns: int | None = None
         self._refused: Refusal | None = None
         self._refused_ns = 0
         self._wake = asyncio.Event()
@@ -182,6 +188,14 @@ class ModeArmingManager:
         return self.is_engaged and not self._authority.taken
 
     @property
+    def is_forsaken(self) -> bool:
+        """Whether it waits, armed, for setpoints that we no longer send, and no pilot is in a mode of his
+        own: it was given back by switch, or nobody had taken it."""
+        now_ns, since_ns = self._clock.now_ns(), self._unflown_since_ns
+        waits = since_ns is not None and now_ns - since_ns > _FORSAKEN_NS
+        return waits and now_ns - self._telemetry.heartbeat_ns < _SEEN_NS
+
+    @property
     def stands(self) -> bool:
         """On the floor, as far as the autopilot knows."""
         says = self._telemetry.landed(self._clock.now_ns())
@@ -225,6 +239,7 @@ class ModeArmingManager:
         if demand is Demand.FLY:
             self._was_armed = self._telemetry.armed and self._authority.held is not None
         self._demand = demand
+        self._unflown_since_ns = None
         self._refused = None
         self._wake.set()
 
@@ -237,6 +252,12 @@ class ModeArmingManager:
             self._wake.set()
         if self._telemetry.armed and self._authority.held == self._firmware.flying_mode:
             self._was_armed = True
+        flies_by_us = self._telemetry.armed and mode == self._firmware.flying_mode
+        if self._demand is not Demand.HANDS_OFF or not flies_by_us:
+            self._unflown_since_ns = None
+        elif self._unflown_since_ns is None:
+            self._unflown_since_ns = now_ns
+            _LOG.warning("armed in mode %s, and nobody flies it", self._firmware.mode_name(mode))
 
     def text(self, severity: int, text: str, now_ns: int) -> None:
         """The autopilot said something; a warning may be the reason of a refusal."""

@@ -116,7 +116,9 @@ class MavlinkVehicle(abc.ABC):
         transport = make_transport(parse_endpoint(url), options.opener)
         codec = Codec(system_id, signing=options.signing)
         beats = Codec(job.own_system_id, signing=options.signing) if self.watches_beats else codec
-        self.link = MavlinkLink(transport, codec, clock, system_id, self._received, beats)
+        self.link = MavlinkLink(
+            transport, codec, clock, system_id, self._received, beats, self._holds_failsafe
+        )
         self._commander = Commander(self.link, system_id)
         self._modes = ModeArmingManager(self, self._commander, self._telemetry, clock)
         self._steering = SetpointShaper(self._modes, self._telemetry)
@@ -273,6 +275,10 @@ class MavlinkVehicle(abc.ABC):
     def keeps_climb(self) -> bool:
         """Whether the autopilot itself keeps a setpoint's climb rate; not where our own height loop does."""
         return False
+
+    def _holds_failsafe(self) -> bool:
+        """Whether our heartbeats go out, which keep the autopilot from landing by itself."""
+        return True
 
     @abc.abstractmethod
     def _thrust(self, setpoint: AttitudeSetpoint, now_ns: int) -> float:

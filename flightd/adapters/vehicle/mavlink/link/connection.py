@@ -37,6 +37,7 @@ class MavlinkLink:
     whose system id may be one that the autopilot's failsafe watches; everything else comes from the `codec`,
     with the vehicle's, else no ground station would show it.
 
+    `holds` says whether there are heartbeats at all: without them the failsafe acts.
     `on_message(message, now_ns)` gets every sound message of that vehicle's autopilot, its HEARTBEAT
     included; what others say (ground stations, gimbals, other vehicles) is not passed on.
     """
@@ -49,10 +50,12 @@ class MavlinkLink:
         system_id: int,
         on_message: Callable[[Message, int], None],
         beats: Codec | None = None,
+        holds: Callable[[], bool] = lambda: True,
     ) -> None:
         self._transport = transport
         self._codec = codec
         self._beats = beats or codec
+        self._holds = holds
         self._namesake_ns: int | None = None
         self._clock = clock
         self._system_id = system_id
@@ -94,7 +97,8 @@ class MavlinkLink:
                 self.system_status,
                 3,
             )
-            self._pass(self._beats.pack(beat))
+            if self._holds():
+                self._pass(self._beats.pack(beat))
             try:
                 async with Within(_HEARTBEAT_S):
                     await lost.wait()
