@@ -140,7 +140,7 @@ class MissionConfig(Section):
     )
     relocate_s: float = Field(30.0, gt=0, le=300, description="position not found again for so long: land")
     telemetry_hold_s: float = Field(0.3, gt=0, le=2, description="telemetry older than this: level and hold")
-    telemetry_land_s: float = Field(3.0, gt=0, le=30, description="telemetry older than this: land")
+    telemetry_land_s: float = Field(3.0, gt=0, le=3, description="telemetry older than this: land")
     battery_start: _Charge = Field(0.30, description="least charge to start")
     battery_home: _Charge = Field(0.20, description="fly home below this charge")
     battery_land: _Charge = Field(0.10, description="land at once below this charge")

@@ -259,7 +259,8 @@ class VehicleState:
     """The newest that the vehicle told, each group with its own time.
 
     `in_control` says that the autopilot is in the mode in which it obeys our setpoints (or, while LAND
-    is demanded, in its landing mode) *and* that we asked for that mode: False means hands off.
+    is demanded, in its landing mode) *and* that we asked for that mode: False means hands off, unless it is
+    `unheard`: silent for so long that nobody knows any more in which mode it is, or whether it is armed.
     `height_m` is above the floor below, along the vertical; NaN when no range finder speaks.
     `stamps_refused` counts attitudes whose own time made no sense (the arrival's was taken);
     `clock_error_s` is by how much their times may be wrong in our clock (standard deviation), NaN where the
@@ -298,6 +299,7 @@ class VehicleState:
     pose_use: PoseUse = PoseUse.NONE
     hovers_unsteered: bool = False
     in_failsafe: bool = False
+    unheard: bool = False
 
     @property
     def may_fly(self) -> bool:

@@ -278,13 +278,27 @@ def test_a_lost_link_ends_control_and_its_return_gives_it_back(on_rig: Any) -> N
         rig.cut(True)
         await asyncio.sleep(rig.gap_s)
         assert not rig.known().in_control
+        assert rig.known().unheard
         assert rig.vehicle.send(AttitudeSetpoint(0)) is False
         assert math.isnan(rig.known().height_m)
         assert rig.known().landed is LandedState.UNKNOWN
         rig.cut(False)
         await rig.until(lambda: rig.known().in_control, 5.0)
+        assert not rig.known().unheard
         await rig.until(lambda: not math.isnan(rig.known().height_m), 5.0)
         assert all(await rig.stream(0.5))
+
+    on_rig(test)
+
+
+def test_a_link_that_falls_silent_looks_like_no_take_over_at_any_moment(on_rig: Any) -> None:
+    async def test(rig: Rig) -> None:
+        await rig.take_off()
+        rig.cut(True)
+        for _ in range(round(rig.gap_s / 0.02)):
+            state = rig.known()
+            assert state.in_control or state.unheard
+            await asyncio.sleep(0.02)
 
     on_rig(test)
 

@@ -25,13 +25,13 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.mission.guidance import Guidance, Guide, MissionInputs
-from flightd.mission.safety.hazard_monitor import GIVE_UP_S, HEARTBEAT_S
+from flightd.mission.safety.hazard_monitor import GIVE_UP_S
 from flightd.mission.safety.hazard_table import ACTIONS
 from flightd.mission.triggers import Trigger
 
 _T = TypeVar("_T")
 
-_HEARTBEAT_NS, _GIVE_UP_NS = round(HEARTBEAT_S * 1e9), round(GIVE_UP_S * 1e9)
+_GIVE_UP_NS = round(GIVE_UP_S * 1e9)
 _BY_SIGHT_NS = 20_000_000_000
 """For so long it may sink by the lines: from higher its autopilot goes on."""
 _LEFT_TO_AUTOPILOT_M = 0.4
@@ -154,7 +154,7 @@ class LastResort:
             self._end = self._end or before
         self.seen = vehicle = vehicle or self.seen
         silent_ns = _GIVE_UP_NS if vehicle is None else _silent_ns(now_ns, vehicle)
-        heard = silent_ns <= self._hold_ns  # silence is no pilot
+        heard = vehicle is not None and self._hears(now_ns, vehicle)  # silence is no pilot
         if self._end is None and vehicle is not None:
             if (heard and not vehicle.armed) or silent_ns > _GIVE_UP_NS:
                 self._end = Phase.ABORTED
@@ -169,6 +169,9 @@ class LastResort:
             return Fallback(before, Demand.KEEP, sinking)
         standing = heard and vehicle.landed is LandedState.ON_GROUND
         return Fallback(Phase.LAND, Demand.DISARM if standing else Demand.LAND, sinking)
+
+    def _hears(self, now_ns: int, vehicle: VehicleState) -> bool:
+        return not vehicle.unheard and now_ns - vehicle.attitude.stamp_ns <= self._hold_ns
 
     def _sighted(
         self, tick: TickInput, last: TickOutput, otherwise: Fallback, by_sight: Callable[[], Sinking | None]
@@ -226,7 +229,7 @@ def sinking_by_sight(inputs: MissionInputs, sink_mps: float) -> Guidance | None:
 
 def _silent_ns(now_ns: int, vehicle: VehicleState) -> int:
     """For how long it has not been heard, in attitudes or in heartbeats."""
-    return max(now_ns - vehicle.attitude.stamp_ns, now_ns - vehicle.heartbeat_ns - _HEARTBEAT_NS)
+    return max(now_ns - vehicle.attitude.stamp_ns, now_ns - vehicle.heartbeat_ns)
 
 
 def _ended(vehicle: VehicleState | None) -> Demand:

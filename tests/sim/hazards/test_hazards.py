@@ -248,6 +248,14 @@ def test_a_drone_that_is_not_heard_comes_to_rest_by_the_pictures() -> None:
     assert math.hypot(silent[-1].vx_mps, silent[-1].vy_mps) < 0.15
 
 
+@pytest.mark.parametrize("name", ["heartbeat_lost", "telemetry_lost"])
+def test_silence_is_no_pilot_however_long_it_is_waited_through(name: str) -> None:
+    patient = CONFIG.with_values(mission={"telemetry_hold_s": 2.0})
+    flown, _ = fly(TRIALS[name], 1, patient)
+    assert flown.phase is Phase.ABORTED
+    assert flown.truth[-1][1].height_m < 0.2
+
+
 def test_one_that_loses_its_height_high_up_is_down_within_twenty_seconds() -> None:
     flown, begun_s = fly(TRIALS["height_lost"], 5, CONFIG.with_values(mission={"height_m": 4.2}))
     found_s = next(e.stamp_ns * 1e-9 for e in flown.events if "height" in e.text and e.name == "hazard")

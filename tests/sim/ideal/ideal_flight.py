@@ -65,6 +65,8 @@ ATTITUDE_NS = 20_000_000
 """As often as an adapter asks an autopilot for it."""
 FRONT_NS = 250_000_000
 READING_NS = 150_000_000
+UNHEARD_NS = 3_000_000_000
+"""Without a heartbeat for so long an adapter no longer knows whose the vehicle is."""
 
 
 @dataclass
@@ -360,8 +362,10 @@ class IdealFlight:
         if self.link is not None:
             return self.link.state(self._now_ns, in_control=lambda armed: armed and self.in_control)
         faults = self.faults
+        unheard = self._now_ns - self._beat_ns > UNHEARD_NS
+        in_control = self._armed and self.in_control and not unheard
         if faults.silent and self._told is not None:
-            return self._told
+            return replace(self._told, in_control=in_control, unheard=unheard)
         on_floor = self.airframe.on_floor
         climb_mps = math.nan if faults.climbless else self.sensors.climb_mps
         if not faults.rangeless:
@@ -380,7 +384,7 @@ class IdealFlight:
             height_stamp_ns=self._range[1],
             climb_mps=climb_mps,
             mode="GUIDED_NOGPS",
-            in_control=self._armed and self.in_control,
+            in_control=in_control,
             armed=self._armed,
             landed=LandedState.ON_GROUND if standing else LandedState.IN_AIR,
             battery_frac=battery,
@@ -390,6 +394,7 @@ class IdealFlight:
             stamps_refused=faults.stamps_refused,
             clock_error_s=faults.clock_error_s,
             in_failsafe=faults.in_failsafe,
+            unheard=unheard,
         )
         return self._told
 

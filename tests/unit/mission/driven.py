@@ -30,6 +30,8 @@ from tests.unit.mission.configured import configured
 SITE = random_site(3)
 POLICY = HeadingPolicy(Heading.ALONG)
 TICK_NS = 20_000_000
+UNHEARD_S = 3.0
+"""An adapter says so of a vehicle whose heartbeat is older."""
 
 
 def at_rest(_seconds: float) -> tuple[float, float]:
@@ -121,7 +123,8 @@ class Flight:
             heard_s = self.inputs.telemetry_age_s + self.heartbeat_s
             beat_ns = self.now_ns - round(heard_s * 1e9)
             # once a tick: copying them costs as much as a third of the mission's step
-            vehicle = replace(vehicle, armed=armed, heartbeat_ns=beat_ns)
+            unheard = heard_s > UNHEARD_S
+            vehicle = replace(vehicle, armed=armed, heartbeat_ns=beat_ns, unheard=unheard)
             self.inputs = replace(self.inputs, now_ns=self.now_ns, vehicle=vehicle, **moved)
             self.guidance = self.mission.step(self.inputs)
             if until():

@@ -68,7 +68,7 @@ def answers(vehicle: VehicleState | None, before: Phase = Phase.FOLLOW) -> tuple
         (replace(FLYING, in_control=False, attitude=LONG_AGO), Phase.LAND, (Phase.LAND, Demand.LAND, True)),
         # heartbeats alone fail to come: the mode is of the past, and no pilot's
         (
-            replace(FLYING, in_control=False, heartbeat_ns=LOST_NS),
+            replace(FLYING, in_control=False, heartbeat_ns=LOST_NS, unheard=True),
             Phase.LAND,
             (Phase.LAND, Demand.LAND, True),
         ),
@@ -83,6 +83,13 @@ def test_it_lands_what_flies_and_leaves_the_rest(
     vehicle: VehicleState | None, before: Phase, expected: tuple[Phase, Demand, bool]
 ) -> None:
     assert answers(vehicle, before) == expected
+
+
+def test_silence_is_no_pilot_however_long_it_is_waited_through() -> None:
+    """Attitudes come, heartbeats have just been missing for so long that the mode is not known any more."""
+    resort = LastResort(configured(telemetry_hold_s=2.0).mission)
+    silent = replace(FLYING, in_control=False, heartbeat_ns=NOW_NS - 3_100_000_000, unheard=True)
+    assert resort.step(NOW_NS, silent, Phase.LAND).demand is Demand.LAND
 
 
 def test_a_vehicle_that_tells_nothing_any_more_is_landed_where_it_flew_when_it_last_did() -> None:

@@ -107,6 +107,7 @@ class ArDroneVehicle:
             unfit=self._unfit(),
             keeps_climb=True,
             hovers_unsteered=True,
+            unheard=not linked,
         )
 
     def _unfit(self) -> Refusal | None:

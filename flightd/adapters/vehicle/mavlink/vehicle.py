@@ -178,7 +178,11 @@ class MavlinkVehicle(abc.ABC):
             refusal=self._modes.refusal,
         )
         known = state and replace(
-            state, unfit=self._modes.unfit, keeps_climb=self.keeps_climb(), pose_use=self._pose.use
+            state,
+            unfit=self._modes.unfit,
+            keeps_climb=self.keeps_climb(),
+            pose_use=self._pose.use,
+            unheard=self._modes.is_silent,
         )
         return known and self._steering.climb_of(known, now_ns)
 

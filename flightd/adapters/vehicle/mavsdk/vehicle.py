@@ -166,7 +166,8 @@ class MavsdkVehicle:
         modes = self._modes
         now_ns = self._clock.now_ns()
         state = self._readings.state(now_ns, in_control=modes.in_control, refusal=modes.refusal)
-        return state and self._steering.climb_of(replace(state, unfit=modes.unfit), now_ns)
+        known = state and replace(state, unfit=modes.unfit, unheard=modes.is_silent)
+        return known and self._steering.climb_of(known, now_ns)
 
     def attitudes(self) -> list[Attitude]:
         return self._readings.attitudes()
