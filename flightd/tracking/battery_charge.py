@@ -23,8 +23,9 @@ whole percents may flicker between two."""
 _FROZEN_LEAST_S = 30.0
 _RISE_FRAC = 0.05
 """A gauge may rise again by so much when the load falls; in flight nothing charges a battery."""
-_CELL_V = (2.4, 4.5)
-"""Between these a cell can be; outside them the number of cells is wrong, or the volts are."""
+_CELL_V = (2.4, 4.4)
+"""Between these a cell can be, the fullest of all kinds at 4.35 V; outside them the number of cells is wrong,
+or the volts are."""
 _LOAD_A = 4.0
 
 

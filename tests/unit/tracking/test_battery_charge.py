@@ -125,6 +125,11 @@ def test_volts_that_the_cells_cannot_have_are_a_doubt(volts: float) -> None:
     assert not judged(5, battery_v=volts).empty
 
 
+def test_a_battery_of_one_cell_more_than_is_configured_is_a_doubt_before_it_is_half_empty() -> None:
+    assert judged(5, BatteryConfig(cells=3), battery_v=13.4).doubt is ChargeDoubt.CELLS  # 3.35 V in each of 4
+    assert judged(5, BatteryConfig(cells=3), battery_v=13.05).doubt is None  # 4.35 V, the fullest there are
+
+
 def test_volts_that_are_told_no_longer_in_flight_are_a_doubt() -> None:
     """Charge alone, counted from full, would decide."""
     judge = BatteryCharge(BatteryConfig(cells=4))
