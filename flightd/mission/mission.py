@@ -392,10 +392,10 @@ class Mission:
         if trigger is Trigger.DWELLED:
             self._go_on(s)
         self._anchor(s, trigger)
-        phase_s = self._progress.phase_s(s.now_ns)
-        self._reporter.begin(s, before, self.state, trigger, outcome.cause, phase_s)
-        self._progress.begin(s, self.phase)
-        self._enter(s, trigger)
+        self._reporter.begin(s, before, self.state, trigger, outcome.cause, self._progress.phase_s(s.now_ns))
+        if before.phase is not Phase.LAND or trigger is not Trigger.STOP:  # a landing goes on
+            self._progress.begin(s, self.phase)
+            self._enter(s, trigger)
 
     def _anchor(self, s: MissionInputs, trigger: Trigger) -> None:
         """Where the phase that begins holds, if it holds anywhere."""

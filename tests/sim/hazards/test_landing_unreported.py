@@ -17,7 +17,7 @@ import pytest
 
 from flightd.config.schema import load_config
 from flightd.core.refusal import words
-from flightd.core.types import AttitudeSetpoint, Demand, EventLevel, Phase
+from flightd.core.types import AttitudeSetpoint, Command, CommandKind, Demand, EventLevel, Phase
 from flightd.runtime.clock import LoopClock
 from flightd.sim.plant.wind import WindParams
 from flightd.site.site_file import load_site
@@ -77,6 +77,23 @@ def is_not_commanded_to_lean(flown: Flown) -> None:
     for output in settled:
         if output.setpoint is not None:
             assert math.hypot(output.setpoint.roll_rad, output.setpoint.pitch_rad) < math.radians(2.0)
+
+
+def test_stops_during_a_landing_neither_begin_it_anew_nor_put_off_its_end() -> None:
+    flight = IdealFlight(SITE, CONFIG, visits=NEAREST)
+    flight.faults.landing_unreported = True
+    ticks = itertools.count()
+
+    def press(phase: Phase, _now_ns: int) -> None:
+        if phase is Phase.LAND and (tick := next(ticks)) % 100 == 50:
+            flight.commands.append(Command(f"stop {tick}", CommandKind.STOP))
+
+    flight.on_tick = press
+    flown = flight.fly(120.0)
+    assert flown.phase is Phase.ABORTED
+    assert landing_s(flown) < 25.0
+    demands = [output.demand for output in flown.outputs if output.phase is Phase.LAND]
+    assert [demand for demand, _ in itertools.groupby(demands)] == [Demand.FLY, Demand.LAND, Demand.DISARM]
 
 
 def test_one_that_is_never_disarmed_is_given_up_and_said_aloud() -> None:
