@@ -219,13 +219,15 @@ class Touchdown:
         self._left_s = AIM_S
 
     def rate_mps(self, s: MissionInputs, target_m: tuple[float, float] | None) -> float:
-        """Rate of descent; 0 while it still aims at `target_m` (None: it lands where it is)."""
+        """Rate of descent; 0 while it still aims at `target_m` (None: it lands where it is) by what it
+        sees."""
         p = self._params
         if (
             target_m is not None
             and abs(s.height_m - ALIGN_M) < 0.1
             and self._left_s > 0.0
             and s.pose is not None
+            and min(s.x_age_s, s.y_age_s) <= p.lines_hold_s
         ):
             off_m = math.hypot(s.pose.x_m - target_m[0], s.pose.y_m - target_m[1])
             if off_m > _AIMED_M or math.hypot(s.pose.vx_mps, s.pose.vy_mps) > _AIMED_MPS:
