@@ -16,8 +16,9 @@ from flightd.mission.safety.plausibility_monitor import PlausibilityMonitor
 from flightd.tracking.carried_motion import NO_LEAD, Lead
 
 _TOUCHDOWN_S = 2.0
-_LOW_M, _LOW_LEAN_RAD = 0.5, math.radians(5.0)
-"""Below this height a landing leans by no more: it may stand already, which is known a second later."""
+_LOW_M, _LANDS_LEAN_RAD = 0.5, math.radians(5.0)
+"""Below this height a landing leans by no more: it may stand already, which is known a second later.  Nor,
+above its pad, by what it no longer sees."""
 
 _LEAST_HASTE = 0.4
 """Where pictures and what answers them are late, or may be later than is known, a lean that changes fast
@@ -31,6 +32,7 @@ class Steering:
     def __init__(self, config: ControlConfig, plausibility: PlausibilityMonitor) -> None:
         self._control = FlightController(config)
         self._limiter = Limiter(config)
+        self._stale_s = config.expert.stale_s
         self._plausibility = plausibility
         self._last_yaw: float | None = None
         self._yaw_rate = 0.0
@@ -82,7 +84,9 @@ class Steering:
         by_sight = guidance.guide is Guide.STEER or (rises and guidance.guide is Guide.BRAKE)
         # what reads nothing is as low as it was
         low = height_m < _LOW_M or (self._lands_low and math.isnan(height_m))
-        self._lands_low = low and guidance.phase is Phase.LAND
+        lands = guidance.phase is Phase.LAND
+        self._lands_low = low and lands
+        unseen = lands and guidance.guide is Guide.STEER and sight_s > self._stale_s
         back = None
         if inputs.localised:
             back = self._plausibility.back(pose, inputs.warnings.line_m, inputs.believed_height_m)
@@ -91,7 +95,7 @@ class Steering:
             back=back,
             data_age_s=age_s,
             at_once=guidance.at_once,
-            most_lean_rad=_LOW_LEAN_RAD if self._lands_low else math.inf,
+            most_lean_rad=_LANDS_LEAN_RAD if self._lands_low or unseen else math.inf,
             climb_error_mps=inputs.warnings.climb_error_mps,
             haste=max(conditions.ease**2, _LEAST_HASTE) if by_sight else 1.0,
         )

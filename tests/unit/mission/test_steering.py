@@ -62,3 +62,30 @@ def test_level_is_the_attitude_that_is_told_of_a_level_drone() -> None:
         leans.append((setpoint.roll_rad, setpoint.pitch_rad))
     assert leans[0] == pytest.approx(level)
     assert max(map(abs, leans[1])) <= config.control.max_tilt_rad + 1e-9, "limits come last"
+
+
+@pytest.mark.parametrize(
+    ("sight_s", "most_rad"), [(0.2, None), (0.6, math.radians(5.0)), (1.5, math.radians(5.0))]
+)
+def test_above_its_pad_it_leans_little_by_what_it_no_longer_sees(
+    sight_s: float, most_rad: float | None
+) -> None:
+    config, flight = configured(), Flight()
+    steering = Steering(config.control, PlausibilityMonitor(SITE, config))
+    flight.to(Phase.FOLLOW)
+    assert flight.guidance is not None
+    assert flight.inputs.pose is not None
+    reference = flight.guidance.reference
+    guidance = replace(flight.guidance, phase=Phase.LAND, guide=Guide.STEER)
+    aside = replace(flight.inputs.pose, x_m=reference.x_m - 0.5, y_m=reference.y_m - 0.5)
+    inputs = replace(flight.inputs, pose=aside, height_m=0.8, x_age_s=sight_s, y_age_s=sight_s)
+    most = 0.0
+    for _ in range(50):
+        inputs = replace(inputs, now_ns=inputs.now_ns + TICK_NS)
+        setpoint = steering.step(inputs, guidance, (0.0, 0.0), 0.0)
+        assert setpoint is not None
+        most = max(most, math.hypot(setpoint.roll_rad, setpoint.pitch_rad))
+    if most_rad is None:
+        assert most > math.radians(7.0), "what it sees it answers in full"
+    else:
+        assert math.radians(3.0) < most <= most_rad + 1e-9
