@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -173,7 +174,7 @@ class GridLocaliser:
         due = now_ns - self._judge_ns >= _JUDGE_NS
         for axis, velocity in ((0, tracks.vx_mps), (1, tracks.vy_mps)):
             lines = tracks.across_y if axis else tracks.across_x
-            self._beside[axis].step(lines)
+            self._beside[axis].step(lines, partial(self._is_of_map, axis))
             carried = now_ns - self._followed_ns(axis, tracks) < _CARRIED_NS
             places.move(axis, velocity, tracks.velocity_sigma_mps[axis], dt_s, carried=carried)
             self._match(axis, lines, reach_m, due)
@@ -204,6 +205,9 @@ class GridLocaliser:
             self._fix(known.x_m - dx_m, known.y_m - dy_m, sigma_m)
 
     # The parts of a step
+
+    def _is_of_map(self, axis: int, track_id: int) -> bool:
+        return self._places.lines(axis).get(track_id, -1) >= 0
 
     def _part(self, axis: int, tracks: Sequence[TrackedLine]) -> None:
         """Tell the places which tracks are surely two lines."""

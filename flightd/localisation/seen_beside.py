@@ -1,9 +1,9 @@
 """Lines that are seen beside each other, in the same frames: two of them are never one line of the map, and
-one that keeps its distance moves as the floor does, whether or not the map has it."""
+one that keeps its distance from one of the map moves as the floor does, whether or not the map has it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -31,8 +31,9 @@ class SeenBeside:
         self._floor: set[int] = set()
         self._newest_ns = 0
 
-    def step(self, tracks: Sequence[TrackedLine]) -> None:
-        """Take the tracks as they are held now; those that were seen last are those of one frame."""
+    def step(self, tracks: Sequence[TrackedLine], is_known: Callable[[int], bool]) -> None:
+        """Take the tracks as they are held now; those that were seen last are those of one frame.  `is_known`
+        tells by its id whether one is a line of the map: two mirrored lamps keep their distance, too."""
         newest_ns = max((track.seen_ns for track in tracks), default=0)
         if newest_ns <= self._newest_ns:
             return
@@ -48,8 +49,9 @@ class SeenBeside:
             pair = self._pairs.setdefault((one.id, other.id), _Pair(apart_m, 0))
             if abs(apart_m - pair.apart_m) > _STEADY_M:
                 pair.apart_m, pair.frames = apart_m, 0
+                self._floor.difference_update((one.id, other.id))
             pair.frames += 1
-            if pair.frames >= _FRAMES:
+            if pair.frames >= _FRAMES and (is_known(one.id) or is_known(other.id)):
                 self._floor.update((one.id, other.id))
 
     def pairs(self) -> list[tuple[int, int]]:

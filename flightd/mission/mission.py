@@ -57,9 +57,8 @@ _VISITED = (Trigger.DWELLED, Trigger.ROUTE_DONE)
 class Mission:
     """One flight of one plan: call `step` at a fixed rate, `drain_events` for what happened.
 
-    With a `scanner` the locations of each visited node are counted instead of a plain hover; `overhead_m` are
-    the heights below the keep-outs (`Site.overhead_m`); with `autostart` (None: as configured) it waits for
-    no start command."""
+    With a `scanner` the locations of each visited node are counted; `overhead_m` are the heights below the
+    keep-outs (`Site.overhead_m`); with `autostart` (None: as configured) it waits for no start command."""
 
     def __init__(
         self,
@@ -393,8 +392,9 @@ class Mission:
             self._go_on(s)
         self._anchor(s, trigger)
         self._reporter.begin(s, before, self.state, trigger, outcome.cause, self._progress.phase_s(s.now_ns))
-        if before.phase is not Phase.LAND or trigger is not Trigger.STOP:  # a landing goes on
-            self._progress.begin(s, self.phase)
+        goes_on = before.phase is Phase.LAND and trigger is Trigger.STOP
+        self._progress.begin(s, self.phase, goes_on=goes_on)
+        if not goes_on:
             self._enter(s, trigger)
 
     def _anchor(self, s: MissionInputs, trigger: Trigger) -> None:

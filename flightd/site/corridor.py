@@ -10,11 +10,11 @@ import numpy as np
 
 from flightd.site.rack_depth import rack_body
 from flightd.site.site import Node, Site
-from flightd.site.ways import BODY_RADIUS_M, KEEP_OUT_HEIGHT_M, KeepOut
+from flightd.site.ways import BODY_RADIUS_M, KEEP_OUT_CLEARANCE_M, KEEP_OUT_HEIGHT_M, KeepOut
 
 _BACK_MPS = 0.3
 """Who comes back faster than this may brake."""
-NEAR_KEEP_OUT_M = BODY_RADIUS_M + 0.15
+NEAR_KEEP_OUT_M = (BODY_RADIUS_M + KEEP_OUT_CLEARANCE_M) / 2
 """Nearer to a keep-out than this the free way is left, the body still outside it: half of what every open
 line keeps from it besides the body."""
 _BRAKES_AFTER_S = 0.3
@@ -104,15 +104,20 @@ class Corridor:
         """Near a keep-out, the way in which it comes to rest counted in, or beside one that stands below the
         legs as high as `height_m` (NaN: unknown): the unit vector (map axes) away from it; outside: the one
         back to the line.  None elsewhere, and when the drone comes back already."""
-        area, near = self.nearest_keep_out(x_m, y_m), self.nearest_way(x_m, y_m)
+        areas = [_nearest_of(area, x_m, y_m) for area in self._keep_outs]
         for low in self._low_keep_outs:
             beside = _nearest_of(low, x_m, y_m)
-            is_level = not height_m > low.to_m + KEEP_OUT_HEIGHT_M
-            if is_level and 0.0 < beside.distance_m < area.distance_m:
-                area = beside
-        bx, by = _away(area, x_m, y_m)
-        near_m = NEAR_KEEP_OUT_M + self._rests_after_m(-vx_mps * bx - vy_mps * by)
-        if area.distance_m >= near_m or not (bx or by):
+            if beside.distance_m > 0.0 and not height_m > low.to_m + KEEP_OUT_HEIGHT_M:
+                areas.append(beside)
+        ways = [(area.distance_m, _away(area, x_m, y_m)) for area in areas]
+        left = [
+            (distance_m - NEAR_KEEP_OUT_M - self._rests_after_m(-vx_mps * bx - vy_mps * by), (bx, by))
+            for distance_m, (bx, by) in ways
+            if bx or by
+        ]
+        least_m, (bx, by) = min(left, default=(math.inf, (0.0, 0.0)))
+        if least_m >= 0.0:
+            near = self.nearest_way(x_m, y_m)
             if not near.free_m < near.distance_m < math.inf:
                 return None
             bx, by = (near.x_m - x_m) / near.distance_m, (near.y_m - y_m) / near.distance_m

@@ -50,11 +50,12 @@ class PhaseProgress:
         self._limit_s = math.inf
         self._since_ns = 0
 
-    def begin(self, s: MissionInputs, phase: Phase) -> None:
-        """A phase begins with this tick."""
-        self._since_ns = s.now_ns
-        self._settling = DebounceTimer()
-        self._limit_s = self._time_limit_s(s, phase)
+    def begin(self, s: MissionInputs, phase: Phase, *, goes_on: bool = False) -> None:
+        """A phase begins; one that `goes_on` only gets all of its time once more."""
+        if not goes_on:
+            self._since_ns = s.now_ns
+            self._settling = DebounceTimer()
+        self._limit_s = self.phase_s(s.now_ns) + self._time_limit_s(s, phase)
 
     def phase_s(self, now_ns: int) -> float:
         """Time since the phase began."""

@@ -27,9 +27,8 @@ class HazardVerdict:
     """One row.  `found_s` counts from the first fault (without faults, or where that was there before: from
     take-off), None when the hazard was not found; `down_s` from there (unfound: from the fault) to the floor;
     where the row asks for no landing at once, from when one began that the plan has not, and where the
-    autopilot takes over and nobody flies, from the fault.  None where no landing followed or the scenario
-    asks for none.  `faults` are all that was wrong with
-    the flight, those that the scenario expects left out."""
+    autopilot takes over and nobody flies, from the fault.  None where no landing followed.  `faults` are all
+    that was wrong with the flight, those that the scenario expects left out."""
 
     hazard: str
     found_s: float | None

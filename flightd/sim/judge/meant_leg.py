@@ -25,9 +25,9 @@ _ROUND_A_CORNER_S = 2.0
 """So long after a stop is reached the leg to it still counts: the drone comes to rest, and turns."""
 _BESIDE_M = 1.0
 """A view from further beside its node is none that a scan takes: it is not believed."""
-_WHEREVER, _WHEREVER_S = frozenset({Phase.RELOCATE, Phase.RECOVER}), 30.0
+_WHEREVER, _WHEREVER_S = frozenset({Phase.RELOCATE, Phase.RECOVER}), 31.0
 """It says itself that it does not know where it is: any line is right, for as long as `mission.relocate_s`
-as shipped; who has not found out by then has to land."""
+as shipped, and the tick that ends it; who has not found out by then has to land."""
 
 Segment = tuple[float, float, float, float]
 """x and y of both ends, m."""

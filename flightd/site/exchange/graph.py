@@ -89,8 +89,9 @@ def site_tables(graph: Graph) -> Imported:
         "blocked": [{"nodes": [renamed[a], renamed[b]]} for row in rows for a, b in _closed(row, along)],
         "pad": _pads(graph, renamed, named[0][0], notes),
     }
-    ceiling_m, low = low_way_tables(graph.nodes, graph.ways, graph.below_m, renamed, notes)
+    ceiling_m, low, short = low_way_tables(graph.nodes, graph.ways, graph.below_m, renamed, notes)
     tables["keep_out"] = low
+    tables["blocked"] += [{"nodes": list(pair)} for pair in short]
     if ceiling_m is not None:
         site["ceiling_m"] = ceiling_m
     places = [replace(place, node=renamed[place.node]) for place in graph.places if place.node in renamed]

@@ -34,9 +34,9 @@ def low_way_tables(
     below_m: Mapping[tuple[str, str], float],
     renamed: Mapping[str, str],
     notes: list[str],
-) -> tuple[float | None, list[dict[str, Any]]]:
-    """The ceiling that heights of ways tell, None where not every way has one, and a keep-out for each way
-    that is lower."""
+) -> tuple[float | None, list[dict[str, Any]], list[tuple[str, str]]]:
+    """The ceiling that heights of ways tell, None where not every way has one, a keep-out for each way that
+    is lower, and those lower ones that are too short for one: nothing may fly there at any height."""
     pairs = dict.fromkeys(tuple(sorted(way)) for way in ways if way[0] in renamed and way[1] in renamed)
     low: dict[tuple[str, str], float] = {}
     for a, b in pairs:
@@ -46,15 +46,18 @@ def low_way_tables(
             if len(set(both)) > 1:
                 notes.append(f"{renamed[a]} to {renamed[b]} has two heights; the lower one is taken")
     ceiling_m = max(low.values()) if low and len(low) == len(pairs) else None
-    tables, lost = [], []
+    tables, lost, short = [], [], []
     for (a, b), height_m in low.items():
         if height_m == ceiling_m:
             continue
         from_m = round(height_m + KEEP_OUT_HEIGHT_M, 6)
         (ax, ay), (bx, by) = nodes[a], nodes[b]
         room = math.dist((ax, ay), (bx, by)) / 2 - _HALF_M > KEEP_OUT_CLEARANCE_M
-        if not room or height_m <= 0.0 or from_m >= min(ceiling_m or _HIGHEST_M, _HIGHEST_M):
+        if from_m >= min(ceiling_m or _HIGHEST_M, _HIGHEST_M):
             lost.append((renamed[a], renamed[b], height_m))
+            continue
+        if not room or height_m <= 0.0:
+            short.append((renamed[a], renamed[b]))
             continue
         x_m, y_m = (ax + bx) / 2, (ay + by) / 2
         tables.append(
@@ -69,4 +72,7 @@ def low_way_tables(
     if lost:
         ways_lost = [f"{a} to {b} ({height_m:g} m)" for a, b, height_m in lost]
         notes.append(f"heights that no keep-out can hold, left out: {listed(ways_lost)}")
-    return ceiling_m, tables
+    if short:
+        closed = [f"{a} to {b}" for a, b in short]
+        notes.append(f"too low, or too short for a keep-out of their heights, closed: {listed(closed)}")
+    return ceiling_m, tables, short

@@ -21,6 +21,7 @@ SITE = random_site(3)
 A1 = SITE.nodes["A1"]
 TICK_NS = 20_000_000
 TRUE, OLD = 0, 1
+OF_MAP = (TRUE,).__contains__
 
 
 def line(id_: int, offset_m: float, tick: int) -> TrackedLine:
@@ -29,18 +30,30 @@ def line(id_: int, offset_m: float, tick: int) -> TrackedLine:
 
 def seen(beside: SeenBeside, offsets_m: list[tuple[float, ...]]) -> None:
     for tick, both in enumerate(offsets_m, 1):
-        beside.step([line(id_, at_m, tick) for id_, at_m in enumerate(both)])
+        beside.step([line(id_, at_m, tick) for id_, at_m in enumerate(both)], OF_MAP)
 
 
 def test_two_lines_in_ten_frames_are_two_and_of_the_floor() -> None:
     beside = SeenBeside()
     seen(beside, [(0.001 * k, 0.12 + 0.001 * k) for k in range(9)])
     assert beside.pairs() == []
-    beside.step([line(0, 0.0, 10), line(1, 0.12, 10)])
+    beside.step([line(0, 0.0, 10), line(1, 0.12, 10)], OF_MAP)
     assert beside.pairs() == [(0, 1)]
-    beside.step([line(1, 0.12, 11)])
+    beside.step([line(1, 0.12, 11)], OF_MAP)
     assert beside.pairs() == []
     assert beside.told_ns([line(1, 0.12, 11), line(2, 0.5, 12)]) == 11 * TICK_NS
+
+
+def test_only_what_keeps_its_distance_from_a_line_of_the_map_is_of_the_floor() -> None:
+    lamps = SeenBeside()
+    for tick in range(1, 31):
+        lamps.step([line(0, 0.01 * tick, tick), line(1, 0.2 + 0.01 * tick, tick)], lambda _: False)
+    assert lamps.told_ns([line(0, 0.3, 30), line(1, 0.5, 30)]) == 0
+    beside = SeenBeside()
+    seen(beside, [(0.0, 0.12)] * 12)
+    assert beside.told_ns([line(1, 0.12, 12)])
+    beside.step([line(0, 0.0, 13), line(1, 0.2, 13)], OF_MAP)
+    assert beside.told_ns([line(1, 0.2, 13)]) == 0
 
 
 @pytest.mark.parametrize(
@@ -62,7 +75,7 @@ def test_lines_that_take_turns_may_be_one() -> None:
     beside = SeenBeside()
     for tick in range(1, 60):
         one, other = (tick, tick - 1) if tick % 2 else (tick - 1, tick)
-        beside.step([line(0, 0.0, one), line(1, 0.12, other)])
+        beside.step([line(0, 0.0, one), line(1, 0.12, other)], OF_MAP)
     assert beside.pairs() == []
 
 
