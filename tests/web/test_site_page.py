@@ -239,9 +239,9 @@ def test_a_finger_draws_what_it_goes_over_and_what_the_browser_takes_away_draws_
         finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
     def swipe(ending: str) -> None:
-        touch("touchStart", (a1[0] + 0.3 * metre, a1[1] + 0.5 * metre))
+        touch("touchStart", (a1[0] + 0.3 * metre, a1[1] + 0.7 * metre))
         for part in (0.25, 0.5, 0.75, 1.0):
-            touch("touchMove", (a1[0] + (0.3 + part) * metre, a1[1] + (0.5 + 1.5 * part) * metre))
+            touch("touchMove", (a1[0] + (0.3 + part) * metre, a1[1] + (0.7 + 1.5 * part) * metre))
         touch(ending)
 
     swipe("touchCancel")
@@ -255,7 +255,7 @@ def test_a_finger_draws_what_it_goes_over_and_what_the_browser_takes_away_draws_
     context.close()
     drawn = tables(file)["keep_out"][-1]
     assert [drawn[key] for key in ("x0_m", "y0_m", "x1_m", "y1_m")] == pytest.approx(
-        [0.3, 0.5, 1.3, 2.0], abs=0.06
+        [0.3, 0.7, 1.3, 2.2], abs=0.06
     )
 
 
