@@ -51,6 +51,15 @@ def test_the_way_in_which_it_comes_to_rest_counts_as_near(speed_mps: float) -> N
     assert CORRIDOR.back(MIDDLE_M, BESIDE.y0_m - 0.5, speed_mps, 0.0) is None, "who passes by does not come"
 
 
+def test_of_two_keep_outs_that_counts_for_which_the_way_to_rest_is_due_first() -> None:
+    ahead = KeepOut(MIDDLE_M + 0.85, A.y_m - 0.3, MIDDLE_M + 1.2, A.y_m + 0.3)
+    beside = KeepOut(MIDDLE_M - 0.3, A.y_m + 0.7, MIDDLE_M + 0.3, A.y_m + 1.3)
+    for order in ((ahead, beside), (beside, ahead)):
+        corridor = Corridor(replace(SITE, keep_outs=order), 10.0)
+        assert corridor.back(MIDDLE_M, A.y_m, 1.0, 0.0) == pytest.approx((-1.0, 0.0))
+        assert corridor.back(MIDDLE_M, A.y_m, 0.0, 0.0) is None
+
+
 @given(st.floats(0.05, 0.8))
 def test_a_leg_that_ends_before_a_keep_out_is_not_hindered(speed_mps: float) -> None:
     """It slows down as legs do, by 0.5 m/s2, for a line that ends where one may."""

@@ -45,6 +45,17 @@ def test_every_site_of_ours_comes_back_from_lif_and_from_csv_as_the_same_floor(n
         assert [pad.id for pad in again.pads] == [pad.id for pad in site.pads]
 
 
+@pytest.mark.parametrize(("apart_m", "is_closed"), [(1.2, True), (1.4, False)])
+def test_a_way_under_a_beam_that_no_keep_out_fits_into_is_closed(apart_m: float, is_closed: bool) -> None:
+    nodes = {"A1": (0.0, 0.0), "A2": (apart_m, 0.0), "A3": (2.0 * apart_m, 0.0)}
+    ways = [("A1", "A2"), ("A2", "A1"), ("A2", "A3"), ("A3", "A2")]
+    below_m = {way: 2.0 if "A3" in way else 6.0 for way in ways}
+    found = site_tables(Graph("hall", nodes, ways, below_m=below_m))
+    assert ({"nodes": ["A2", "A3"]} in found.tables.get("blocked", [])) is is_closed
+    assert bool(found.tables.get("keep_out")) is not is_closed
+    assert any("closed: A2 to A3" in note for note in found.notes) is is_closed
+
+
 def test_lif_has_its_y_to_the_left_and_a_station_for_each_place() -> None:
     site = load_site(CONFIGS / "site-racks-small.toml")
     layout = lif_document(site, UTC)["layouts"][0]
