@@ -20,7 +20,7 @@ _STEADY_M = 0.03
 @dataclass(slots=True)
 class _Pair:
     apart_m: float
-    frames: int = 1
+    frames: int = 0
 
 
 class SeenBeside:
@@ -46,7 +46,7 @@ class SeenBeside:
             apart_m = other.offset_m - one.offset_m
             if not _LEAST_M < abs(apart_m) < _MOST_M:
                 continue
-            pair = self._pairs.setdefault((one.id, other.id), _Pair(apart_m, 0))
+            pair = self._pairs.setdefault((one.id, other.id), _Pair(apart_m))
             if abs(apart_m - pair.apart_m) > _STEADY_M:
                 pair.apart_m, pair.frames = apart_m, 0
                 self._floor.difference_update((one.id, other.id))

@@ -109,12 +109,12 @@ class Corridor:
             beside = _nearest_of(low, x_m, y_m)
             if beside.distance_m > 0.0 and not height_m > low.to_m + KEEP_OUT_HEIGHT_M:
                 areas.append(beside)
-        ways = [(area.distance_m, _away(area, x_m, y_m)) for area in areas]
-        left = [
-            (distance_m - NEAR_KEEP_OUT_M - self._rests_after_m(-vx_mps * bx - vy_mps * by), (bx, by))
-            for distance_m, (bx, by) in ways
-            if bx or by
-        ]
+        left = []
+        for area in areas:
+            bx, by = _away(area, x_m, y_m)
+            if bx or by:
+                near_m = NEAR_KEEP_OUT_M + self._rests_after_m(-vx_mps * bx - vy_mps * by)
+                left.append((area.distance_m - near_m, (bx, by)))
         least_m, (bx, by) = min(left, default=(math.inf, (0.0, 0.0)))
         if least_m >= 0.0:
             near = self.nearest_way(x_m, y_m)

@@ -93,9 +93,9 @@ class WidthHeights:
         if not by_width_m or not told_m > 0:
             return median(by_width_m) if by_width_m else told_m / self._believed_share
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
-        agrees = abs(told_m / nearest_m - 1.0) < _AGREEING and not self._left_behind(
-            by_width_m, told_m, stamp_ns
-        )
+        dt_s = min((stamp_ns - self._stamp_ns) * 1e-9, _LONGEST_S)
+        agrees = abs(told_m / nearest_m - 1.0) < _AGREEING
+        agrees = agrees and not self._left_behind(by_width_m, told_m, dt_s)
         if not agrees and nearest_m < told_m < _UNMEASURED_M:
             return told_m / self._believed_share
         if self._last_m is not None and not agrees:  # it is no better for being nearer to what is wrong
@@ -103,7 +103,6 @@ class WidthHeights:
             nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
         share = told_m / nearest_m
         change = self._change(nearest_m, share)
-        dt_s = min((stamp_ns - self._stamp_ns) * 1e-9, _LONGEST_S)
         gain = _gain(dt_s)
         self._stamp_ns = stamp_ns
         goes_on = change < LEAP + LEAP_PER_S * dt_s
@@ -126,14 +125,13 @@ class WidthHeights:
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
         return nearest_m if leapt or self._believed_share != 1.0 else told_m
 
-    def _left_behind(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int) -> bool:
+    def _left_behind(self, by_width_m: Sequence[float], told_m: float, dt_s: float) -> bool:
         """A told height that has left those of the lines that are followed is not right again because some
         other line happens to agree with it."""
         last_m = self._last_m
         if last_m is None or not self._followed or self._believed_share == 1.0:
             return False
         same_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
-        dt_s = min((stamp_ns - self._stamp_ns) * 1e-9, _LONGEST_S)
         goes_on = abs(math.log(same_m / last_m)) < LEAP + LEAP_PER_S * dt_s
         return goes_on and abs(told_m / same_m - 1.0) > _DOUBTED
 

@@ -17,7 +17,7 @@ from flightd.core.types import AttitudeSetpoint, Event, Phase, Status
 from flightd.mission.safety.hazard_table import HAZARDS
 from flightd.mission.triggers import Trigger
 from flightd.replay.log import FlightLog, read_log
-from flightd.sim.judge.flight_evidence import FlightEvidence
+from flightd.sim.judge.flight_evidence import FlightEvidence, phase_begins
 from flightd.sim.judge.flight_score import FlightScore, score
 from flightd.sim.judge.hazard_verdict import HazardVerdict, judged_hazard
 from flightd.sim.judge.verdict import JudgedFault, judged
@@ -109,8 +109,9 @@ def _piloted_ns(simulation: Simulation, begun: Sequence[dict[str, Any]], events:
     """From when on there is a pilot: in our simulator when he takes the sticks; in another one always, but
     where the autopilot itself says that a failsafe of its own took over."""
     if simulation.truth_url:
-        failsafe = f" -> {Phase.PILOT.value}: {Trigger.FAILSAFE_TOOK.value}"
-        return math.inf if any(e.name == "phase" and failsafe in e.text for e in events) else -math.inf
+        failsafe = f"{Phase.PILOT.value}: {Trigger.FAILSAFE_TOOK.value}"
+        taken = phase_begins(events, Phase.PILOT)
+        return math.inf if any(failsafe in event.text for event in taken) else -math.inf
     return min((note["stamp_ns"] for note in begun if note["kind"] == "pilot"), default=math.inf)
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import re
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,8 +14,10 @@ from flightd.sim.judge.motion import TrueMotion
 from flightd.sim.plant.kinematics import ON_FLOOR_M, ArmedChange, Kinematics
 from flightd.site.site import Site
 
-_LAND_BEGINS = re.compile(r"(?!land )\w+ -> land: .*")
-"""An event of this phase is a warning where the landing is not the plan's."""
+
+def phase_begins(events: Iterable[Event], phase: Phase) -> list[Event]:
+    """The events by which a phase began: `before -> phase: why`."""
+    return [event for event in events if event.name == "phase" and f" -> {phase.value}: " in event.text]
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,9 @@ class FlightEvidence:
 
     @property
     def landings(self) -> list[Event]:
-        """When the daemon began to land, in time order."""
-        return [e for e in self.events if e.name == "phase" and _LAND_BEGINS.fullmatch(e.text)]
+        """When the daemon began to land, in time order: warnings where that was not the plan's."""
+        again = f"{Phase.LAND.value} -> "
+        return [event for event in phase_begins(self.events, Phase.LAND) if not event.text.startswith(again)]
 
     @property
     def landings_in_need(self) -> list[Event]:

@@ -11,7 +11,7 @@ import numpy as np
 from flightd.core.types import Event, Phase
 from flightd.mission.safety.hazard_table import Action
 from flightd.sim.judge.clearance import clearances
-from flightd.sim.judge.flight_evidence import FlightEvidence
+from flightd.sim.judge.flight_evidence import FlightEvidence, phase_begins
 from flightd.sim.judge.flight_score import FlightScore, longest_uncontrolled, off_leg_in_air, overshoot
 from flightd.sim.judge.motion import GAP_S
 from flightd.sim.plant.kinematics import OFF_FLOOR_M
@@ -193,8 +193,7 @@ def _asking_for_landing(flight: FlightEvidence) -> list[Event]:
     """The hazards that ask for a landing at once, the landings that others led to, and where there is no
     pilot the take-overs by the autopilot's failsafe, which lands."""
     hazards = [e for e in flight.events if e.name == "hazard" and e.text.endswith(_ASKS_FOR_LANDING)]
-    taken = [e for e in flight.events if e.name == "phase" and f" -> {Phase.PILOT.value}: " in e.text]
-    return [*hazards, *flight.landings_in_need, *taken]
+    return [*hazards, *flight.landings_in_need, *phase_begins(flight.events, Phase.PILOT)]
 
 
 def _staying_armed(flight: FlightEvidence) -> Iterator[JudgedFault]:
