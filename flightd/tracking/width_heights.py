@@ -31,7 +31,8 @@ _LOW_SHARE = 0.35
 take-off of 0.9 m/s is told 0.1 m too low by a range finder that lags 0.1 s.  But for a height that the range
 finder cannot measure: what its least reading is off from there is no error of the line."""
 _RISES_MPS = 1.5
-"""No take-off climbs faster, so near the floor its heights change by no more."""
+_STEADY_MPS = 0.75
+"""No take-off climbs faster, so near the floor its heights change by no more; as a rule by half."""
 _RANGE_LAG_S, _DELAY_SIGMAS = 0.1, 2.0
 """A range finder tells the height of so long before its stamp at most: what it averages over.  A frame is of
 so many standard deviations of its delay earlier or later at most."""
@@ -105,7 +106,7 @@ class WidthHeights:
         change = self._change(nearest_m, share)
         gain = _gain(dt_s)
         self._stamp_ns = stamp_ns
-        goes_on = change < LEAP + LEAP_PER_S * dt_s
+        goes_on = change < self._leap(dt_s)
         if agrees or (self._judged and goes_on):
             if not self._judged:
                 self._judged, self._share = True, 1.0
@@ -118,12 +119,19 @@ class WidthHeights:
         least_m, most_m = (told_m + by_m for by_m in climbed_m)
         self._share += gain * (min(max(nearest_m, least_m), most_m) / nearest_m - self._share)
         if self._last_m is not None:
-            self._changes += gain * (change / (_STEADY + _STEADY_PER_S * dt_s) - self._changes)
+            steady = _STEADY + max(_STEADY_PER_S, _STEADY_MPS / self._last_m) * dt_s
+            self._changes += gain * (change / steady - self._changes)
             self._followed = agrees or (self._followed and goes_on)
         self._last_m = self.by_width_m = nearest_m
         self._told_m = told_m
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
         return nearest_m if leapt or self._believed_share != 1.0 else told_m
+
+    def _leap(self, dt_s: float) -> float:
+        """By how much more than in `dt_s` what the lines tell does not change, as a share: near the floor any
+        climb changes it by much."""
+        per_s = LEAP_PER_S if self._last_m is None else max(LEAP_PER_S, _RISES_MPS / self._last_m)
+        return LEAP + per_s * dt_s
 
     def _left_behind(self, by_width_m: Sequence[float], told_m: float, dt_s: float) -> bool:
         """A told height that has left those of the lines that are followed is not right again because some
@@ -132,7 +140,7 @@ class WidthHeights:
         if last_m is None or not self._followed or self._believed_share == 1.0:
             return False
         same_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
-        goes_on = abs(math.log(same_m / last_m)) < LEAP + LEAP_PER_S * dt_s
+        goes_on = abs(math.log(same_m / last_m)) < self._leap(dt_s)
         return goes_on and abs(told_m / same_m - 1.0) > _DOUBTED
 
     def _change(self, nearest_m: float, share: float) -> float:
