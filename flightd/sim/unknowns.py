@@ -64,6 +64,9 @@ class Unknowns:
     """The most by which steel turns the compass."""
     gyro_share: float = 0.0
     """The most by which the gyros scale a rate."""
+    gyro_noise_radps: float = _SENSORS.gyro_noise_radps
+    tilt_rate_bias_radps: tuple[float, float] = (0.0, 0.0)
+    """What is left of the biases of the roll and pitch gyros, less what the autopilot knows of them."""
     yaw_drift_radps: float = _SENSORS.yaw_drift_radps
     readout_s: float = 0.0
     map_error_m: float = 0.0
@@ -92,6 +95,12 @@ class Unknowns:
     drag_share: float = 1.0
     capacity_share: float = 1.0
     """Of the battery."""
+    current_share: float = 1.0
+    """Of the battery's current, by which its charge is counted."""
+    volt_share: float = 1.0
+    bandwidth_share: float = 1.0
+    """Of the attitude loop, as its damping."""
+    damping_share: float = 1.0
     thrust_to_weight: float | None = None
     """The most that the motors lift, less as the battery's voltage sags; None: all that is asked for."""
     wash_mps: float = 0.0
@@ -169,6 +178,8 @@ class Unknowns:
             configured,
             compass_rad=self.compass_rad,
             gyro_share=self.gyro_share,
+            gyro_noise_radps=self.gyro_noise_radps,
+            tilt_rate_bias_radps=self.tilt_rate_bias_radps,
             yaw_drift_radps=self.yaw_drift_radps,
             tilt_bias=self.tilt_bias_rad,
             tilt_wander_rad=self.tilt_wander_rad,
@@ -179,6 +190,7 @@ class Unknowns:
             baro_wander_m=self.baro_wander_m,
             range_lag_s=self.range_lag_s,
             range_echo=self.range_echo,
+            battery=replace(configured.battery, current_share=self.current_share, volt_share=self.volt_share),
         )
 
     def radio(self, configured: RadioParams) -> tuple[RadioParams, RadioParams]:
@@ -197,6 +209,8 @@ class Unknowns:
         """The airframe as it really is."""
         return replace(
             configured,
+            attitude_bandwidth_radps=configured.attitude_bandwidth_radps * self.bandwidth_share,
+            attitude_damping=configured.attitude_damping * self.damping_share,
             hover_collective=configured.hover_collective * self.hover_share,
             drag_per_s=configured.drag_per_s * self.drag_share,
             rest_tilt_rad=self.stand_tilt_rad,
@@ -228,6 +242,8 @@ class Spread:
     readout_s: float
     compass_deg: float
     gyro_share: float
+    gyro_noise_degps: float
+    tilt_rate_degps: float
     yaw_drift_degps: float
     map_m: float
     tilt_deg: float
@@ -248,9 +264,13 @@ class Spread:
     darkest_face: float
     lightest_face: float
     body_share: float
+    current_share: float
+    volt_share: float
+    attitude_loop_share: float
     thrust_to_weight: float | None
     wash_mps: float
-    range_lag_s: float
+    quickest_range_s: float
+    slowest_range_s: float
     range_echo: float
     quickest_exposure_s: float
     slowest_exposure_s: float
@@ -276,6 +296,8 @@ SPREADS = {
         readout_s=0.005,
         compass_deg=5.0,
         gyro_share=0.005,
+        gyro_noise_degps=0.5,
+        tilt_rate_degps=0.2,
         yaw_drift_degps=0.05,
         map_m=0.01,
         tilt_deg=0.5,
@@ -296,9 +318,13 @@ SPREADS = {
         darkest_face=0.75,
         lightest_face=1.05,
         body_share=0.10,
+        current_share=0.05,
+        volt_share=0.005,
+        attitude_loop_share=0.15,
         thrust_to_weight=None,
         wash_mps=0.0,
-        range_lag_s=0.04,
+        quickest_range_s=0.02,
+        slowest_range_s=0.06,
         range_echo=0.0,
         quickest_exposure_s=0.1,
         slowest_exposure_s=0.1,
@@ -322,6 +348,8 @@ SPREADS = {
         readout_s=0.015,
         compass_deg=25.0,
         gyro_share=0.02,
+        gyro_noise_degps=1.5,
+        tilt_rate_degps=0.5,
         yaw_drift_degps=0.3,
         map_m=0.05,
         tilt_deg=0.5,
@@ -342,9 +370,13 @@ SPREADS = {
         darkest_face=0.35,
         lightest_face=1.8,
         body_share=0.25,
+        current_share=0.10,
+        volt_share=0.01,
+        attitude_loop_share=0.30,
         thrust_to_weight=1.7,
         wash_mps=0.4,
-        range_lag_s=0.10,
+        quickest_range_s=0.05,
+        slowest_range_s=0.15,
         range_echo=0.02,
         quickest_exposure_s=0.5,
         slowest_exposure_s=1.5,
@@ -368,6 +400,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
     leaps = random.Random(f"leaps {kind} {seed}")
     body, light = random.Random(f"body {kind} {seed}"), random.Random(f"exposure {kind} {seed}")
     legs = random.Random(f"legs {kind} {seed}")
+    autopilot, power = random.Random(f"autopilot {kind} {seed}"), random.Random(f"power {kind} {seed}")
 
     def within(limit: float) -> float:
         return rng.uniform(-limit, limit)
@@ -405,6 +438,11 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         hover_share=1.0 + within(most.hover_share),
         compass_rad=math.radians(abs(within(most.compass_deg))),
         gyro_share=most.gyro_share,
+        gyro_noise_radps=math.radians(most.gyro_noise_degps),
+        tilt_rate_bias_radps=(
+            math.radians(autopilot.uniform(-most.tilt_rate_degps, most.tilt_rate_degps)),
+            math.radians(autopilot.uniform(-most.tilt_rate_degps, most.tilt_rate_degps)),
+        ),
         yaw_drift_radps=math.radians(most.yaw_drift_degps),
         readout_s=within(most.readout_s),
         gust_rms_mps=most.gust_mps,
@@ -413,7 +451,11 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         capacity_share=1.0 + body.uniform(-most.body_share, most.body_share),
         thrust_to_weight=most.thrust_to_weight,
         wash_mps=most.wash_mps,
-        range_lag_s=most.range_lag_s,
+        bandwidth_share=1.0 + autopilot.uniform(-most.attitude_loop_share, most.attitude_loop_share),
+        damping_share=1.0 + autopilot.uniform(-most.attitude_loop_share, most.attitude_loop_share),
+        current_share=1.0 + power.uniform(-most.current_share, most.current_share),
+        volt_share=1.0 + power.uniform(-most.volt_share, most.volt_share),
+        range_lag_s=autopilot.uniform(most.quickest_range_s, most.slowest_range_s),
         range_echo=most.range_echo,
         exposure_lag_s=light.uniform(most.quickest_exposure_s, most.slowest_exposure_s),
         flicker=light.uniform(most.least_flicker, most.most_flicker),

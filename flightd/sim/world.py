@@ -41,6 +41,7 @@ from flightd.sim.racks.front_camera import FrontCamera
 from flightd.sim.racks.renderer import FrontRenderer
 from flightd.sim.scenario.fault_schema import Fault
 from flightd.sim.scenario.faults import FaultListener, WorldFaults, bare_boxes
+from flightd.sim.sensors.battery_monitor import MonitorParams
 from flightd.sim.sensors.camera import CameraPeer, PictureMaker
 from flightd.sim.sensors.camera_path import CameraPath
 from flightd.sim.sensors.cheap_camera import FAITHFUL, CheapCamera, CheapParams
@@ -251,10 +252,15 @@ def _autopilot(spec: WorldSpec, airframe: Airframe, goods: Sequence[Goods], cloc
         parameters=parameters,
         clock_ppm=spec.clock_ppm,
         clock_leap=spec.unknowns.clock_leap,
-        sensors=spec.unknowns.sensors(SensorParams(range_min_m=spec.range_least_m, goods=goods)),
+        sensors=_sensors(spec, SensorParams(range_min_m=spec.range_least_m, goods=goods)),
         second_range_m=spec.second_range_m,
     )
     return Px4Peer(clock, airframe, config) if is_px4 else ArduCopterPeer(clock, airframe, config)
+
+
+def _sensors(spec: WorldSpec, configured: SensorParams) -> SensorParams:
+    """The vehicle's, set up for its battery, as they really are."""
+    return spec.unknowns.sensors(replace(configured, battery=MonitorParams(spec.battery_ah)))
 
 
 def _down_camera(
@@ -353,7 +359,7 @@ def _ardrone(
         from flightd.sim.ardrone.video import VideoChannel  # noqa: PLC0415
     except ModuleNotFoundError as err:
         raise missing_extra("ardrone", "simulating an AR.Drone") from err
-    drone = Drone(airframe, Sensors(spec.unknowns.sensors(SensorParams(goods=goods)), seed=spec.seed))
+    drone = Drone(airframe, Sensors(_sensors(spec, SensorParams(goods=goods)), seed=spec.seed))
     ports = DronePorts("127.0.0.1", *spec.vehicle_ports)
     server = ArDroneServer(drone, clock, ports, air=spec.radio, seed=spec.seed)
     appearance = spec.front.appearance if spec.front is not None else RackAppearance()

@@ -55,6 +55,8 @@ class Drone:
         self.options = options or DroneOptions()
         self.configuration = Configuration()
         self.loops = FlightLoops(airframe, sensors)
+        self._battery = sensors.battery
+        self._battery.update(0.0, airframe)  # it may be told to fly at once
         self.send_configuration: Callable[[bytes], None] = lambda _text: None
         self.faults = 0
         self.warnings = 0
@@ -194,14 +196,14 @@ class Drone:
             self._fly = False
         if self.faults and not self.emergency:
             self._cut_motors(now_ns)
-        if self.airframe.battery_frac < self.options.forced_landing_frac:
+        if self._battery.charge_frac < self.options.forced_landing_frac:
             self._fly = False
 
     def _advance(self, now_ns: int) -> None:
         since_s = (now_ns - self._entered_ns) / 1e9
         options = self.options
         if self.major == MajorState.LANDED:
-            charged = self.airframe.battery_frac >= options.low_battery_frac
+            charged = self._battery.charge_frac >= options.low_battery_frac
             if self._fly and charged and not self.emergency:
                 self._enter(MajorState.TAKE_OFF, now_ns)
         elif self.major == MajorState.LANDING:
@@ -291,7 +293,7 @@ class Drone:
             BIT_DEMO: self._bootstrap or self.configuration.flag("general:navdata_demo"),
             BIT_BOOTSTRAP: self._bootstrap,
             BIT_COM_LOST: self._com_lost and self._command_ns is not None,
-            BIT_VBAT_LOW: self.airframe.battery_frac < self.options.low_battery_frac,
+            BIT_VBAT_LOW: self._battery.charge_frac < self.options.low_battery_frac,
             BIT_COM_WATCHDOG: late,
             BIT_EMERGENCY: self.emergency,
         }
@@ -306,8 +308,8 @@ class Drone:
             sequence=self._navdata_sequence,
             major=self.major,
             minor=self.minor,
-            battery_percent=round(self.airframe.battery_frac * 100),
-            battery_mv=round(self.airframe.battery_v * 1000),
+            battery_percent=round(self._battery.charge_frac * 100),
+            battery_mv=round(self._battery.volts * 1000),
             theta_mdeg=math.degrees(loops.pitch_rad) * 1000,
             phi_mdeg=math.degrees(loops.roll_rad) * 1000,
             psi_mdeg=math.degrees(loops.yaw_rad) * 1000,

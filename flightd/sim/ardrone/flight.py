@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from flightd.core.geometry import wrap_pi
-from flightd.sim.autopilot.climb_loop import ClimbLoop
+from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
 from flightd.sim.plant.airframe import Airframe, AirframeCommand
 from flightd.sim.sensors.instruments import Sensors
 
@@ -21,6 +21,8 @@ _HOLD_INTEGRAL_RAD_PER_M_S = 0.04
 _STILL_MPS = 0.15
 _YAW_LEAD_MAX_RAD = math.radians(20.0)
 _IDLE_COLLECTIVE = 0.1
+_CLIMB = ClimbGains(accel_mps2=5.0, jerk_mps3=50.0)
+"""It is not known how it shapes a climb: nearly at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +45,7 @@ class FlightLoops:
     def __init__(self, airframe: Airframe, sensors: Sensors) -> None:
         self._airframe = airframe
         self._sensors = sensors
-        self._climb_loop = ClimbLoop()
+        self._climb_loop = ClimbLoop(_CLIMB)
         self._roll_trim_rad = self._pitch_trim_rad = 0.0
         self._yaw_zero_rad = airframe.yaw_rad + sensors.params.heading_offset_rad
         self._yaw_target_rad = 0.0
@@ -112,6 +114,7 @@ class FlightLoops:
             targets.climb_mps,
             height_m=self.height_m,
             speed_mps=self.climb_mps,
+            accel_mps2=self._sensors.accel_mps2,
             tilt_cos=math.cos(self.roll_rad) * math.cos(self.pitch_rad),
         )
         # The loops steer what they believe; the airframe is told the truth that makes the belief come true.

@@ -13,7 +13,7 @@ from typing import ClassVar
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flightd.ports import Clock
-from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
+from flightd.sim.autopilot.climb_loop import ClimbLoop
 from flightd.sim.autopilot.external_vision import ExternalVision, Taken
 from flightd.sim.autopilot.link import Address, MavlinkChannel, Message, UdpLink
 from flightd.sim.autopilot.parameters import ParameterServer
@@ -113,6 +113,7 @@ class AutopilotPeer(abc.ABC):
     ) -> None:
         self.airframe = airframe
         self.sensors = Sensors(config.sensors, config.seed)
+        self.sensors.battery.update(0.0, airframe)  # whoever arms it at once has a voltage to be refused for
         self.instruments = Instruments(airframe, self.sensors, config.second_range_m)
         self.parameters = parameters
         self.link = UdpLink(
@@ -142,7 +143,7 @@ class AutopilotPeer(abc.ABC):
         self.lamp_lit = False
         """Whether its output that a lamp hangs on is switched on."""
         """What others gave it to show, newest last."""
-        self._climb_loop = ClimbLoop(ClimbGains(hover_guess=airframe.params.hover_collective))
+        self._climb_loop = ClimbLoop()
         self._stick_yaw_rad = 0.0
         self._idle_s = 0.0
         self._settled_s = 0.0
@@ -340,6 +341,7 @@ class AutopilotPeer(abc.ABC):
             climb_mps,
             height_m=sensors.height_m,
             speed_mps=sensors.climb_mps,
+            accel_mps2=sensors.accel_mps2,
             tilt_cos=math.cos(sensors.roll_rad) * math.cos(sensors.pitch_rad),
         )
 

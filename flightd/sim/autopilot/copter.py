@@ -17,6 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.core.geometry import GRAVITY_MPS2
 from flightd.ports import Clock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
+from flightd.sim.autopilot.climb_loop import ClimbGains
 from flightd.sim.autopilot.earth_field import earth_field_mgauss
 from flightd.sim.autopilot.external_vision import NOT_TAKEN, Taken
 from flightd.sim.autopilot.guided import AngleTarget
@@ -29,6 +30,9 @@ _THRUST_IS_COLLECTIVE = 8
 _RELAYS = 16
 _IDLE_COLLECTIVE = 0.05
 _LAND_DETECT_S = 1.0
+_LEARN_S, _LEARN_MPS, _LEARN_RAD = 10.0, 0.6, math.radians(5.0)
+"""ArduCopter learns what it hovers at within this time, while it climbs and leans by less."""
+_LEAST_HOVER, _MOST_HOVER = 0.125, 0.6875
 _PAUSE_S = 4.0
 """A failsafe's landing holds the height for so long before it sinks."""
 _WATCH_S = 1.0 / 3.0
@@ -89,6 +93,7 @@ class ArduCopterPeer(AutopilotPeer):
         super().__init__(clock, airframe, config, parameters)
         self.mode = CopterMode.STABILIZE
         self._target = AngleTarget()
+        self._collective = 0.0
         self._low_battery_told = False
         self._low_battery_s = 0.0
         self._client_silent_s: float | None = None
@@ -122,7 +127,8 @@ class ArduCopterPeer(AutopilotPeer):
             self.mode = mode
             self._target = AngleTarget(yaw_rad=self.sensors.yaw_rad)
             self._stick_yaw_rad = self.sensors.yaw_rad
-            self._climb_loop.reset(self.sensors.height_m)
+            self._climb_loop.gains = self._climb_gains()
+            self._climb_loop.reset(self.sensors.height_m, self._collective)
             self._pause_s = 0.0
             self.link.broadcast(self._heartbeat())
         return int(dialect.MAV_RESULT_ACCEPTED)
@@ -177,7 +183,7 @@ class ArduCopterPeer(AutopilotPeer):
         unhealthy = self.arming_block or self._unhealthy()
         if unhealthy:
             return f"PreArm: {unhealthy}"
-        if self.airframe.battery_v < self.parameters["BATT_LOW_VOLT"]:
+        if self.sensors.battery.volts < self.parameters["BATT_LOW_VOLT"]:
             return "PreArm: Battery 1 below minimum arming voltage"
         if self.mode in _NOT_ARMABLE:
             return f"Arm: {self.mode.name} mode not armable"
@@ -250,9 +256,14 @@ class ArduCopterPeer(AutopilotPeer):
             return self._stand(dt_s)
         self.landed = False
         self._idle_s = 0.0
-        held = self._hold_climb(dt_s, climb_mps)
-        collective = held if raw is None else raw
+        if raw is None:
+            collective = self._hold_climb(dt_s, climb_mps)
+        else:
+            collective = raw
+            self._climb_loop.reset(self.sensors.height_m, raw)
+        self._collective = collective
         self._detect_landing(dt_s, climb_mps, collective)
+        self._learn_hover(dt_s)
         return self._fly(roll, pitch, yaw, yaw_rate, collective)
 
     def _targets(self, dt_s: float) -> tuple[float, float, float, float, float]:
@@ -291,6 +302,7 @@ class ArduCopterPeer(AutopilotPeer):
     def _stand(self, dt_s: float) -> AirframeCommand:
         """Armed on the floor: motors idle, targets follow the vehicle, and the disarm delay runs."""
         self._climb_loop.reset(self.sensors.height_m)
+        self._collective = 0.0
         self._stick_yaw_rad = self.sensors.yaw_rad
         if self._target.holding:
             self._target.yaw_rad = self.sensors.yaw_rad
@@ -301,13 +313,31 @@ class ArduCopterPeer(AutopilotPeer):
         return AirframeCommand(motors=True, collective=_IDLE_COLLECTIVE, yaw_rad=self.airframe.yaw_rad)
 
     def _detect_landing(self, dt_s: float, climb_mps: float, collective: float) -> None:
-        """Down is wanted, the motors are near their minimum and nothing moves: for a second."""
+        """Down is wanted, the motors are near their minimum, by what it believes to hover at, and nothing
+        moves: for a second."""
         low = collective < 0.6 * self.parameters["MOT_THST_HOVER"]
         still = abs(self.sensors.climb_mps) < 0.15
         self._settled_s = self._settled_s + dt_s if climb_mps < 0.0 and low and still else 0.0
         if self._settled_s >= _LAND_DETECT_S:
             self.landed = True
             self._settled_s = 0.0
+
+    def _climb_gains(self) -> ClimbGains:
+        """As parameters are set; it reads them when it enters a mode."""
+        accel_mps2 = self.parameters["WPNAV_ACCEL_Z"] / 100.0
+        return ClimbGains(accel_mps2=accel_mps2, jerk_mps3=self.parameters["PSC_JERK_Z"])
+
+    def _learn_hover(self, dt_s: float) -> None:
+        """MOT_THST_HOVER follows the collective of a hover that is nearly level, where MOT_HOVER_LEARN says
+        so."""
+        sensors, parameters = self.sensors, self.parameters
+        leans = max(abs(sensors.roll_rad), abs(sensors.pitch_rad)) > _LEARN_RAD
+        if self.landed or not parameters["MOT_HOVER_LEARN"] or leans or not self._collective:
+            return
+        if abs(sensors.climb_mps) < _LEARN_MPS:
+            guess = parameters["MOT_THST_HOVER"]
+            guess += (self._collective - guess) * dt_s / (dt_s + _LEARN_S)
+            parameters["MOT_THST_HOVER"] = min(max(guess, _LEAST_HOVER), _MOST_HOVER)
 
     def _watch_client(self, dt_s: float) -> None:
         """The failsafe for the ground station: once the system it watches was heard and has fallen silent, as
@@ -330,11 +360,11 @@ class ArduCopterPeer(AutopilotPeer):
         """The failsafe for a voltage that stays low for so long."""
         if self._low_battery_told or not self.armed:
             return
-        is_low = self.airframe.battery_v < self.parameters["BATT_LOW_VOLT"]
+        is_low = self.sensors.battery.volts < self.parameters["BATT_LOW_VOLT"]
         self._low_battery_s = self._low_battery_s + dt_s if is_low else 0.0
         if self._low_battery_s > self.parameters["BATT_LOW_TIMER"]:
             self._low_battery_told = True
-            self.say(dialect.MAV_SEVERITY_CRITICAL, f"Battery 1 is low {self.airframe.battery_v:.2f}V")
+            self.say(dialect.MAV_SEVERITY_CRITICAL, f"Battery 1 is low {self.sensors.battery.volts:.2f}V")
             if self.parameters["BATT_FS_LOW_ACT"] == 1:
                 self._land_by_failsafe()
 

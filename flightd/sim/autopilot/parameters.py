@@ -44,9 +44,12 @@ COPTER_PARAMETERS: dict[str, float] = {
     "GUID_TIMEOUT": 0.3,
     "WPNAV_SPEED_UP": 250,
     "WPNAV_SPEED_DN": 150,
+    "WPNAV_ACCEL_Z": 250,
+    "PSC_JERK_Z": 20,
     "LAND_SPEED": 90,
     "ANGLE_MAX": 3000,
-    "MOT_THST_HOVER": 0.34,
+    "MOT_THST_HOVER": 0.35,
+    "MOT_HOVER_LEARN": 2,
 }
 """ArduCopter 4.5's names and units, set up for flight without position."""
 

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flightd.core.geometry import GRAVITY_MPS2
 from flightd.ports import Clock
 from flightd.sim.autopilot.autopilot import AutopilotPeer, PeerConfig
 from flightd.sim.autopilot.external_vision import Taken
@@ -24,6 +25,10 @@ _STREAM_S = 1.0
 _STREAM_GAP_S = 0.5
 _IDLE_COLLECTIVE = 0.04
 _LAND_DETECT_S = 1.0
+_LOW_SHARE = 0.3
+"""Of the way from MPC_THR_MIN to the hover thrust."""
+_HOVER_S, _LEAST_FELT = 2.0, 0.5
+"""The hover thrust is known within this time; of a fall (share of the weight felt) nothing is learnt."""
 _FORCE = 21196
 _EV_PLACE, _EV_SPEED = 1, 4
 """Bits of EKF2_EV_CTRL."""
@@ -51,8 +56,8 @@ _NEEDS_POSITION = frozenset({Px4Mode.POSCTL, Px4Mode.AUTO_LOITER})
 
 
 class Px4Peer(AutopilotPeer):
-    """A PX4 multicopter on the floor, disarmed, in ALTCTL.  Its hover thrust is the airframe's, which
-    MPC_THR_HOVER does not know."""
+    """A PX4 multicopter on the floor, disarmed, in ALTCTL.  What it hovers at it begins to
+    estimate at MPC_THR_HOVER, by what its accelerometers feel in the air."""
 
     pilots_mode = Px4Mode.ALTCTL
     landing_mode = Px4Mode.AUTO_LAND
@@ -69,7 +74,8 @@ class Px4Peer(AutopilotPeer):
         self.mode = Px4Mode.ALTCTL
         self._q_target = (0.0, 0.0, 0.0)
         self._yaw_rate_radps = 0.0
-        self._thrust = 0.0
+        self._thrust = self._collective = 0.0
+        self._hover = parameters["MPC_THR_HOVER"]
         self._setpoint_age_s = math.inf
         self._stream_s = 0.0
         self._has_flown = self._in_failsafe = False
@@ -116,7 +122,7 @@ class Px4Peer(AutopilotPeer):
         if mode != self.mode:
             self.mode = mode
             self._stick_yaw_rad = self.sensors.yaw_rad
-            self._climb_loop.reset(self.sensors.height_m)
+            self._climb_loop.reset(self.sensors.height_m, self._collective)
 
     def _mode_of(self, params: tuple[float, ...]) -> int:
         """DO_SET_MODE carries main and sub mode as parameters 2 and 3."""
@@ -210,6 +216,8 @@ class Px4Peer(AutopilotPeer):
         if self.mode == Px4Mode.OFFBOARD and self._setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
             self._lose_offboard()
         roll, pitch, yaw, yaw_rate, collective, down = self._targets(dt_s)
+        self._collective = collective
+        self._estimate_hover(dt_s)
         self._detect_landing(dt_s, collective, down=down)
         self._disarm_when_done(dt_s)
         return self._fly(roll, pitch, yaw, yaw_rate, max(collective, _IDLE_COLLECTIVE))
@@ -230,15 +238,26 @@ class Px4Peer(AutopilotPeer):
         collective = self._hold_climb(dt_s, climb_mps)
         return roll, pitch, self._stick_yaw_rad, sticks.yaw_rate_radps, collective, climb_mps < 0.0
 
+    def _estimate_hover(self, dt_s: float) -> None:
+        """As its hover thrust estimator, which begins anew with each flight."""
+        if self.landed:
+            self._hover = self.parameters["MPC_THR_HOVER"]
+            return
+        felt = 1.0 + self.sensors.accel_mps2 / GRAVITY_MPS2
+        if felt > _LEAST_FELT:
+            hovers = self._collective * self.airframe.tilt_cos / felt
+            self._hover += (hovers - self._hover) * min(dt_s / _HOVER_S, 1.0)
+
     def _detect_landing(self, dt_s: float, collective: float, *, down: bool) -> None:
-        """Without a climb-rate setpoint only a thrust near zero counts as landed."""
-        hover = self.airframe.params.hover_collective
-        low = collective < 0.6 * hover if down else collective <= self.parameters["MPC_MANTHR_MIN"] + 0.01
+        """Without a climb-rate setpoint only a thrust near zero counts as landed; with one also a thrust that
+        is low by what it believes to hover at."""
+        least, idle = self.parameters["MPC_THR_MIN"], self.parameters["MPC_MANTHR_MIN"] + 0.01
+        low = collective <= (least + _LOW_SHARE * (self._hover - least) if down else idle)
         still = abs(self.sensors.climb_mps) < self.parameters["LNDMC_Z_VEL_MAX"]
         self._settled_s = self._settled_s + dt_s if low and still else 0.0
         if self._settled_s >= _LAND_DETECT_S:
             self.landed = True
-        elif self.sensors.climb_mps > 0.15 and collective > 0.5 * hover:
+        elif self.sensors.climb_mps > 0.15 and collective > idle:
             self.landed = False
             self._has_flown = True
 

@@ -145,24 +145,24 @@ class Instruments:
         return dialect.MAVLink_vfr_hud_message(0.0, 0.0, heading_deg, throttle_pc, 0.0, climb_mps)
 
     def _battery(self) -> Message:
-        airframe = self._airframe
-        cell_mv = round(airframe.battery_v * 1000 / _CELLS)
+        battery = self._sensors.battery
+        cell_mv = round(battery.volts * 1000 / _CELLS)
         cells = [cell_mv] * _CELLS + [_NO_CELL] * (10 - _CELLS)
-        used_mah = round((1.0 - airframe.battery_frac) * airframe.params.battery_capacity_ah * 1000)
-        current_ca, remaining_pc = round(airframe.current_a * 100), self._remaining_pc()
+        used_mah, current_ca = round(battery.used_ah * 1000), round(battery.amperes * 100)
+        remaining_pc = self._remaining_pc()
         return dialect.MAVLink_battery_status_message(
             0, 0, dialect.MAV_BATTERY_TYPE_LIPO, 32767, cells, current_ca, used_mah, -1, remaining_pc
         )
 
     def _remaining_pc(self) -> int:
         told_pc = self._sensors.fault.charge_pc
-        return round(self._airframe.battery_frac * 100) if told_pc is None else told_pc
+        return round(self._sensors.battery.charge_frac * 100) if told_pc is None else told_pc
 
     def _sys_status(self) -> Message:
-        airframe = self._airframe
+        battery = self._sensors.battery
         sensors = dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO | dialect.MAV_SYS_STATUS_PREARM_CHECK
         healthy = sensors if self.healthy else dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO
-        millivolt, centiampere = round(airframe.battery_v * 1000), round(airframe.current_a * 100)
+        millivolt, centiampere = round(battery.volts * 1000), round(battery.amperes * 100)
         remaining_pc = self._remaining_pc()
         return dialect.MAVLink_sys_status_message(
             sensors, sensors, healthy, 200, millivolt, centiampere, remaining_pc, 0, 0, 0, 0, 0, 0

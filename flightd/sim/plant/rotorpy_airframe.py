@@ -2,7 +2,8 @@
 
 The vehicle is the AscTec Hummingbird as RotorPy ships it (S. Folk, J. Paulos, V. Kumar, RotorPy, 2023; MIT
 licence), which nobody of this project has fitted.  What an autopilot does is as for our own airframe: its
-attitude loop has the bandwidth and damping of `AirframeParams`, its collective hovers at the same share.
+attitude loop has the bandwidth and damping of `AirframeParams`, its collective hovers at the same share, and
+its drag is off by as much.
 Air, battery and floor are ours, so that the same seed blows the same wind.
 
 RotorPy's axes are forward, left, up; ours are forward, right, with pitch and yaw of the other sign.
@@ -25,6 +26,9 @@ from flightd.sim.plant.wind import WindParams
 
 _YAW_AHEAD_RAD = 0.3
 """The wanted heading is asked for in steps: a quadcopter's yaw is weak, and its motors saturate."""
+_OWN_DRAG_PER_S = AirframeParams().drag_per_s
+_DRAGS = "c_Dx", "c_Dy", "c_Dz", "k_d", "k_z"
+"""Of body and rotors: by so much more or less than the Hummingbird's as `drag_per_s` is than our own."""
 _FLIP = np.diag([1.0, -1.0, -1.0])
 """Forward, right, down to forward, left, up; and back."""
 
@@ -46,6 +50,8 @@ class RotorpyAirframe(Airframe):
     ) -> None:
         configured = params or AirframeParams()
         multirotor, quad = _rotorpy()
+        drag_share = configured.drag_per_s / _OWN_DRAG_PER_S
+        quad |= {name: drag_share * quad[name] for name in _DRAGS}
         loop = {
             "kp_att": configured.attitude_bandwidth_radps**2,
             "kd_att": 2.0 * configured.attitude_damping * configured.attitude_bandwidth_radps,

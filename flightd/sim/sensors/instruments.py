@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from flightd.core.geometry import GRAVITY_MPS2, wrap_pi
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.sensors.battery_monitor import BatteryMonitor, MonitorParams
 from flightd.sim.sensors.steel_field import SteelField
 
 
@@ -37,6 +38,8 @@ class SensorParams:
     gyro_noise_radps: float = math.radians(0.3)
     gyro_share: float = 0.0
     """The most by which a gyro tells a rate too large or too small, as a share of it."""
+    tilt_rate_bias_radps: tuple[float, float] = (0.0, 0.0)
+    """By so much the rates about the body's axes of roll and pitch are told too large."""
     compass_rad: float = 0.0
     """The most by which steel turns the compass at any place."""
     compass_s: float = 5.0
@@ -61,6 +64,7 @@ class SensorParams:
     range_echo: float = 0.0
     """Share of readings that came back by a longer way."""
     goods: Sequence[Goods] = ()
+    battery: MonitorParams = field(default_factory=MonitorParams)
 
 
 _LEAST_COS = 0.3
@@ -117,7 +121,9 @@ class Sensors:
         self._gyro_scale = 1.0 + gyros.uniform(-p.gyro_share, p.gyro_share)
         self._roll_wander = self._pitch_wander = self._baro_wander = self._climb_error = 0.0
         self.roll_rad = self.pitch_rad = self.yaw_rad = 0.0
-        self.height_m = self.climb_mps = 0.0
+        self.height_m = self.climb_mps = self.accel_mps2 = 0.0
+        self._climb_mps: float | None = None
+        self.battery = BatteryMonitor(p.battery)
         self._below_m: float | None = None
 
     @property
@@ -175,6 +181,9 @@ class Sensors:
         above_m = airframe.height_m - airframe.params.rest_height_m
         self.height_m = above_m + self._baro_wander + self._drifted_m
         self.climb_mps = airframe.climb_mps + self._climb_error + self.fault.climb_drift_mps
+        last_mps = airframe.climb_mps if self._climb_mps is None else self._climb_mps
+        self.accel_mps2, self._climb_mps = (airframe.climb_mps - last_mps) / dt_s, airframe.climb_mps
+        self.battery.update(dt_s, airframe)
         if p.range_lag_s:
             below_m = self._to_below_m(airframe)
             last_m = below_m if self._below_m is None else self._below_m
@@ -196,14 +205,15 @@ class Sensors:
         self._pitch_leak -= part * (airframe.pitch_rad + self._pitch_leak - felt_pitch)
 
     def body_rates_radps(self, truth: Kinematics) -> tuple[float, float, float]:
-        """What the gyros feel about the body's axes; that of the yaw has the bias by which the heading
-        drifts."""
+        """What the gyros feel about the body's axes, less what the estimator knows of their biases; that of
+        the yaw has the bias by which the heading drifts."""
         gauss, scale, noise = self._gyro_rng.gauss, self._gyro_scale, self.params.gyro_noise_radps
         roll, pitch, yaw = (
             scale * rate + gauss(0.0, noise)
             for rate in (truth.roll_rate_radps, truth.pitch_rate_radps, truth.yaw_rate_radps)
         )
-        return roll, pitch, yaw + self._yaw_drift
+        bias_roll, bias_pitch = self.params.tilt_rate_bias_radps
+        return roll + bias_roll, pitch + bias_pitch, yaw + self._yaw_drift
 
     def noisy_yaw_rad(self) -> float:
         """The yaw estimate as a telemetry sample: with its noise."""

@@ -14,17 +14,18 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flightd.runtime.clock import LoopClock
 from flightd.sim.autopilot.autopilot import PeerConfig, Sticks
 from flightd.sim.autopilot.copter import ArduCopterPeer, CopterMode
-from flightd.sim.plant.airframe import Airframe
+from flightd.sim.plant.airframe import Airframe, AirframeParams
 from tests.protocol.mavlink.raw_client import RawClient
 from tests.rigs.event_loops import virtual
 from tests.rigs.vehicles import CALM
 
 
 @asynccontextmanager
-async def pair(config: PeerConfig | None = None) -> AsyncIterator[tuple[ArduCopterPeer, RawClient]]:
-    peer = ArduCopterPeer(
-        LoopClock(), Airframe(wind=CALM), config or PeerConfig(ready_s=0.0, parameters={"GUID_TIMEOUT": 3.0})
-    )
+async def pair(
+    config: PeerConfig | None = None, params: AirframeParams | None = None
+) -> AsyncIterator[tuple[ArduCopterPeer, RawClient]]:
+    config = config or PeerConfig(ready_s=0.0, parameters={"GUID_TIMEOUT": 3.0})
+    peer = ArduCopterPeer(LoopClock(), Airframe(params, CALM), config)
     client = await RawClient.connect(await peer.open())
     async with asyncio.TaskGroup() as tasks:
         serving = tasks.create_task(peer.run())
@@ -195,6 +196,25 @@ def test_thrust_is_a_climb_rate(thrust: float, climb_mps: float) -> None:
     virtual(test())
 
 
+@pytest.mark.parametrize(
+    ("parameters", "rise_m"),
+    [({}, 0.35), ({"WPNAV_ACCEL_Z": 100, "PSC_JERK_Z": 5}, 0.75)],
+    ids=["as shipped", "the firmware's defaults"],
+)
+def test_a_climb_that_is_to_end_goes_on_as_the_parameters_have_it(
+    parameters: dict[str, float], rise_m: float
+) -> None:
+    async def test() -> None:
+        async with pair(PeerConfig(ready_s=0.0, parameters=parameters)) as (peer, client):
+            yaw = await hovering(peer, client, 2.0)
+            await client.fly(3.0, yaw_rad=yaw, thrust=0.7)
+            end_m = peer.truth().height_m
+            await client.fly(3.0, yaw_rad=yaw)
+            assert peer.truth().height_m - end_m == pytest.approx(rise_m, rel=0.2)
+
+    virtual(test())
+
+
 def test_with_the_thrust_option_thrust_is_collective() -> None:
     async def test() -> None:
         async with pair(PeerConfig(ready_s=0.0, parameters={"GUID_OPTIONS": 8})) as (peer, client):
@@ -299,6 +319,22 @@ def test_sinking_lands_and_disarms_by_the_delay_and_land_mode_at_once() -> None:
             assert peer.truth().height_m == pytest.approx(0.1)
             assert await client.command(400, 1) == 4  # LAND is not armable
             assert "LAND mode not armable" in client.last("STATUSTEXT").text
+
+    virtual(test())
+
+
+@pytest.mark.parametrize("hover", [0.25, 0.45])
+def test_what_it_hovers_at_is_learnt_in_flight_and_tells_when_it_has_landed(hover: float) -> None:
+    async def test() -> None:
+        async with pair(params=AirframeParams(hover_collective=hover)) as (peer, client):
+            yaw = await hovering(peer, client)
+            guess = peer.parameters["MOT_THST_HOVER"]
+            assert abs(guess - 0.35) < 0.4 * abs(hover - 0.35)
+            await client.fly(30.0, yaw_rad=yaw)
+            assert peer.parameters["MOT_THST_HOVER"] == pytest.approx(hover, rel=0.03)
+            assert not peer.landed
+            await client.fly(8.0, yaw_rad=yaw, thrust=0.4)
+            assert peer.landed
 
     virtual(test())
 

@@ -91,6 +91,15 @@ def test_a_copter_waits_a_second_at_most_for_a_companion_that_is_silent(timeout_
     virtual(test())
 
 
+def test_a_limit_that_has_another_unit_in_a_newer_version_is_mended_in_that() -> None:
+    (rule,) = (one for one in rules_for(Firmware.ARDUPILOT, Job()) if "WP_ACC_Z" in one.names)
+    for name, slow, better in (("WPNAV_ACCEL_Z", 100.0, 250.0), ("WP_ACC_Z", 1.0, 2.5)):
+        finding = judge(rule, (name, slow))
+        assert finding is not None
+        assert finding.better == better
+        assert judge(rule, (name, better)) is None
+
+
 def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:
     async def test() -> None:
         async with examined(Px4Peer, COM_OBL_RC_ACT=0, COM_RCL_EXCEPT=0) as (peer, examination):

@@ -14,7 +14,7 @@ from flightd.sim.plant.wind import WindParams
 from flightd.sim.unknowns import Unknowns
 from flightd.site.site_file import load_site
 from tests.sim.ideal.floor_points import FloorPoints
-from tests.sim.ideal.ideal_flight import Flown, IdealFlight
+from tests.sim.ideal.ideal_flight import FRAME_NS, Flown, IdealFlight
 from tests.sim.ideal.ideal_sight import EyeView
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -126,4 +126,6 @@ def test_what_is_none_of_the_floor_tells_no_motion(
     flown = blown(Shadow(*lamp) if lamp else Stuck(), 1, across=across, unknowns=shaken)
     told = [output.tracks.features_ns for output in flown.outputs if output.tracks is not None]
     assert told
-    assert max(map(max, told)) == 0
+    frames = {max(one) for one in told} - {0}
+    # the shadow of a drone that rises along the ray of its lamp lies still, until that drifts off it
+    assert len(frames) * FRAME_NS < 500_000_000

@@ -56,7 +56,7 @@ GUST: Final = """
 kind = "wind"
 at_x_m = 1.3
 at_y_m = 0.0
-mean_y_mps = 2.4                 # towards the machine
+mean_y_mps = 2.8                 # towards the machine
 duration_s = 1.0
 
 [expect]

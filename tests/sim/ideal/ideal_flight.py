@@ -34,12 +34,13 @@ from flightd.core.types import (
     VehicleState,
 )
 from flightd.ports import Lamp
-from flightd.sim.autopilot.climb_loop import ClimbGains, ClimbLoop
+from flightd.sim.autopilot.climb_loop import ClimbLoop
 from flightd.sim.leap import LeapInFlight
 from flightd.sim.plant.airframe import Airframe, AirframeCommand, AirframeParams
 from flightd.sim.plant.charge_pads import ChargePads, PadService
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wind import WindParams
+from flightd.sim.sensors.battery_monitor import MonitorParams
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
 from flightd.sim.unknowns import Shaken, Unknowns
@@ -159,18 +160,20 @@ class IdealFlight:
         self._armed = False
         self._now_ns = 1_000_000_000_000
         unknown = unknowns or Unknowns()
-        frame = unknown.airframe(airframe or AirframeParams())
+        configured = airframe or AirframeParams()
+        frame = unknown.airframe(configured)
         wash = unknown.wash(world, seed)
         self.seed = seed
         self.airframe = Airframe(frame, wind=wind, seed=seed, x_m=x_m, y_m=y_m, wash=wash)
-        self.sensors = Sensors(unknown.sensors(SensorParams()), seed)
+        battery = MonitorParams(configured.battery_capacity_ah)
+        self.sensors = Sensors(unknown.sensors(SensorParams(battery=battery)), seed)
         camera = unknown.camera(SimCamera(config.camera.lens(), config.camera.mount()))
         self._eye = IdealEye(world, camera.lens, camera.mount, errors, seed)
         self._shaken = Shaken(unknown.shake_rad, seed)
         self._camera_off_ns = round(unknown.camera_delay_s * 1e9)
         self._camera_leap = LeapInFlight(unknown.camera_leap)
         self._jitter_s, self._jitter = unknown.camera_jitter_s, random.Random(f"jitter {seed}")
-        self._climb = ClimbLoop(ClimbGains(hover_guess=frame.hover_collective))
+        self._climb = ClimbLoop()
         self._delay_ns = delay_ns
         self.link: IdealLink | None = None
         """Between autopilot and daemon; None: telemetry and setpoints are there at once."""
@@ -295,7 +298,6 @@ class IdealFlight:
         if demand is Demand.FLY and not self._armed:
             self._armed = True
             self._yaw_target = self.airframe.yaw_rad
-            self._climb.reset(self.airframe.height_m)
         elif demand is Demand.DISARM and not self.faults.endless:
             self._armed = False
 
@@ -307,12 +309,15 @@ class IdealFlight:
         )
         self._yaw_target += wanted.yaw_rate_radps * dt_s
         collective = 0.05
-        if flying:
+        if not flying:
+            self._climb.reset(self.sensors.height_m)
+        else:
             collective = self._climb.step(
                 dt_s,
                 wanted.climb_mps,
                 height_m=self.sensors.height_m,
                 speed_mps=self.sensors.climb_mps,
+                accel_mps2=self.sensors.accel_mps2,
                 tilt_cos=self.airframe.tilt_cos,
             )
         self.airframe.step(
@@ -377,7 +382,7 @@ class IdealFlight:
         if not faults.heartless:
             self._beat_ns = self._now_ns
         standing = on_floor and not faults.landing_unreported
-        battery = self.airframe.battery_frac if faults.battery is None else faults.battery
+        battery = self.sensors.battery.charge_frac if faults.battery is None else faults.battery
         self._told = VehicleState(
             attitude=self._attitude(),
             height_m=math.nan if self._now_ns - self._range[1] > 10**9 else self._range[0],

@@ -25,7 +25,7 @@ NEAR = ("A2", "A3")
 ROW = ("A2", "A3", "A4", "A5")
 THREE = ROW[:3]
 """More than what is left of a battery at `LOW` is enough for."""
-LOW = 0.45
+LOW = 0.43
 SWAPS = BatteryConfig(flight_s=120.0, swap=True, swap_wait_s=120.0)
 SMALL = AirframeParams(battery_capacity_ah=0.4)
 """Hovers for some 100 s."""

@@ -110,6 +110,17 @@ def gust_offset_m(kind: PlantKind) -> float:
     return max(places) - start_m
 
 
+def test_a_drag_that_is_off_is_so_for_it_too() -> None:
+    speeds = []
+    for drag_per_s in (0.2, 0.335, 0.5):
+        frame = airframe_kind(PlantKind.ROTORPY)(AirframeParams(drag_per_s=drag_per_s), wind=STILL_AIR)
+        frame.height_m, frame.vx_mps, frame.on_floor = 1.5, 2.0, False
+        flown(frame, 1.0, held)
+        speeds.append(frame.vx_mps)
+    assert speeds[0] - speeds[1] > 0.1
+    assert speeds[1] - speeds[2] > 0.1
+
+
 def test_it_stops_as_our_own_and_is_pushed_a_third_farther() -> None:
     """Its rotors' drag is 0.45 of its speed in a second, ours 0.335: that is what differs."""
     stop = stopping_m(PlantKind.ROTORPY) / stopping_m(PlantKind.OWN)

@@ -43,3 +43,10 @@ def test_simulated_gyros_drift_as_the_told_heading_and_err_in_scale() -> None:
         felt.append(yaw_radps - drift_radps)
     assert all(math.isclose(one, 1.0, abs_tol=0.1) for one in felt)
     assert max(felt) - min(felt) > 0.05
+
+
+def test_gyros_of_roll_and_pitch_are_told_with_what_is_left_of_their_biases() -> None:
+    sensors = Sensors(
+        SensorParams(gyro_noise_radps=0.0, yaw_drift_radps=0.0, tilt_rate_bias_radps=(0.01, -0.02))
+    )
+    assert sensors.body_rates_radps(Airframe().kinematics(0)) == pytest.approx((0.01, -0.02, 0.0))

@@ -38,6 +38,9 @@ def test_what_is_drawn_stays_within_its_world_and_reaches_what_it_is_of(kind: Wo
     assert max(delays) > 0.8 * most.delay_s
     assert min(delays) < -0.8 * most.delay_s
     assert max(one.stand_tilt_rad[0] for one in drawn) > 0.8 * math.radians(most.stand_deg)
+    assert max(one.bandwidth_share for one in drawn) > 1.0 + 0.8 * most.attitude_loop_share
+    assert min(one.damping_share for one in drawn) < 1.0 - 0.8 * most.attitude_loop_share
+    assert len({one.range_lag_s for one in drawn}) == len(drawn)
     for one in drawn:
         camera = one.camera(SimCamera())
         assert camera.capture_delay_s == pytest.approx(max(0.060 + one.camera_delay_s, 0.005))
@@ -55,6 +58,13 @@ def test_what_is_drawn_stays_within_its_world_and_reaches_what_it_is_of(kind: Wo
             assert abs(one.clock_leap.by_s) == most.clock_leap_s
         else:
             assert one.camera_leap == one.clock_leap == NEVER
+        body, told = one.airframe(AirframeParams()), one.sensors(SensorParams())
+        assert abs(body.attitude_bandwidth_radps / 10.0 - 1.0) <= most.attitude_loop_share
+        assert abs(body.attitude_damping / 0.94 - 1.0) <= most.attitude_loop_share
+        assert most.quickest_range_s <= told.range_lag_s <= most.slowest_range_s
+        assert math.degrees(max(map(abs, told.tilt_rate_bias_radps))) <= most.tilt_rate_degps
+        assert abs(told.battery.current_share - 1.0) <= most.current_share
+        assert abs(told.battery.volt_share - 1.0) <= most.volt_share
         down_s, up_s = one.path_s
         assert down_s + up_s == pytest.approx(2.0 * most.path_s)
 

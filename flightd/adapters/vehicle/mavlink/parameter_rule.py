@@ -22,6 +22,8 @@ class Rule:
     expected: str
     reason: str
     better: float | None = None
+    newer: float | None = None
+    """`better` under its newest name, where that has another unit."""
     optional: bool = False
     """Versions that do not have it do as they should."""
     advised: bool = False
@@ -61,7 +63,9 @@ def judge(rule: Rule, found: tuple[str, float] | None) -> ParameterFinding | Non
     if found is None or rule.fits(found[1]):
         return None
     name, value = found
-    return ParameterFinding(name, value, rule.expected, rule.reason, rule.better, rule.advised)
+    is_newer = rule.newer is not None and name == rule.names[-1]
+    better = rule.newer if is_newer else rule.better
+    return ParameterFinding(name, value, rule.expected, rule.reason, better, rule.advised)
 
 
 def judge_all(rules: Iterable[Rule], read: Read) -> list[ParameterFinding]:

@@ -61,6 +61,8 @@ def _range_finder(sensor: int) -> tuple[Rule, ...]:
 
 _CLIMB = "the climb rate shows a range finder that sticks: it must not come from the same one"
 
+_CLIMBS_ON = "a climb that must end rises 0.2 m more; by the firmware's defaults 0.4 m"
+
 _ARDUPILOT: tuple[Rule, ...] = (
     Rule(
         ("GUID_TIMEOUT",),
@@ -142,6 +144,15 @@ _ARDUPILOT: tuple[Rule, ...] = (
         "a landing of last resort is blind: it drifts for as long as it takes (1 m/s is a drop of 5 cm)",
         90,
     ),
+    Rule(
+        ("WPNAV_ACCEL_Z", "WP_ACC_Z"),
+        lambda value: 200 <= value <= 500 or 2 <= value <= 5,
+        "200 to 500 cm/s2 (4.7: 2 to 5 m/s2)",
+        _CLIMBS_ON,
+        250,
+        newer=2.5,
+    ),
+    Rule(("PSC_JERK_Z", "PSC_JERK_D", "PSC_D_JERK"), within(15, 50), "15 to 50 m/s3", _CLIMBS_ON, 20),
 )
 
 _PX4: tuple[Rule, ...] = (
