@@ -99,8 +99,8 @@ class Unknowns:
     """Of the battery's current, by which its charge is counted."""
     volt_share: float = 1.0
     bandwidth_share: float = 1.0
-    """Of the attitude loop, as its damping."""
     damping_share: float = 1.0
+    """Of the attitude loop, as the bandwidth."""
     thrust_to_weight: float | None = None
     """The most that the motors lift, less as the battery's voltage sags; None: all that is asked for."""
     wash_mps: float = 0.0

@@ -14,7 +14,8 @@ _STEADY, _STEADY_PER_S = 0.03, 0.9
 """Lines whose widths tell heights that change by more from frame to frame (share, and share a second between
 them) are none of the map; a fast climb changes them by less."""
 LEAP, LEAP_PER_S = 0.04, 1.8
-"""A height by widths that leaps by more from one frame to the next is another line's."""
+"""A height by widths that leaps by more from one frame to the next is another line's, but for a climb near
+the floor."""
 _STEADY_S, _STEADY_SHARE = 0.95, 0.08
 """Widths that never agreed with the height are held against it, too, once they were so long the same share
 of it, within so much on average: a range finder that reads too little from the floor on."""
@@ -31,11 +32,11 @@ _LOW_SHARE = 0.35
 take-off of 0.9 m/s is told 0.1 m too low by a range finder that lags 0.1 s.  But for a height that the range
 finder cannot measure: what its least reading is off from there is no error of the line."""
 _RISES_MPS = 1.5
-_STEADY_MPS = 0.75
-"""No take-off climbs faster, so near the floor its heights change by no more; as a rule by half."""
+_STEADY_MPS = 1.0
+"""No take-off climbs faster, so near the floor its heights change by no more; as a rule by two thirds."""
 _RANGE_LAG_S, _DELAY_SIGMAS = 0.1, 2.0
-"""A range finder tells the height of so long before its stamp at most: what it averages over.  A frame is of
-so many standard deviations of its delay earlier or later at most."""
+"""A range finder tells the height of so long before its stamp, as a rule at most: what it averages over.  A
+frame is of so many standard deviations of its delay earlier or later at most."""
 
 
 def climbed_between_m(climb_mps: float, delay_sigma_s: float) -> tuple[float, float]:
@@ -55,7 +56,7 @@ class WidthHeights:
         self._share = 1.0
         self._changes = 0.0
         self._last_m: float | None = None
-        self._stamp_ns = 0
+        self._stamp_ns = self._last_ns = 0
         self._judged = False
         self._followed = False  # by its widths, from frame to frame, since it last agreed with the one told
         self._watched = _Watched()
@@ -96,7 +97,7 @@ class WidthHeights:
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
         dt_s = min((stamp_ns - self._stamp_ns) * 1e-9, _LONGEST_S)
         agrees = abs(told_m / nearest_m - 1.0) < _AGREEING
-        agrees = agrees and not self._left_behind(by_width_m, told_m, dt_s)
+        agrees = agrees and not self._left_behind(by_width_m, told_m, stamp_ns, dt_s)
         if not agrees and nearest_m < told_m < _UNMEASURED_M:
             return told_m / self._believed_share
         if self._last_m is not None and not agrees:  # it is no better for being nearer to what is wrong
@@ -105,8 +106,9 @@ class WidthHeights:
         share = told_m / nearest_m
         change = self._change(nearest_m, share)
         gain = _gain(dt_s)
+        goes_on = change < LEAP + self._rise(stamp_ns, dt_s, LEAP_PER_S, _RISES_MPS)
+        steady = _STEADY + self._rise(stamp_ns, dt_s, _STEADY_PER_S, _STEADY_MPS)
         self._stamp_ns = stamp_ns
-        goes_on = change < self._leap(dt_s)
         if agrees or (self._judged and goes_on):
             if not self._judged:
                 self._judged, self._share = True, 1.0
@@ -119,28 +121,29 @@ class WidthHeights:
         least_m, most_m = (told_m + by_m for by_m in climbed_m)
         self._share += gain * (min(max(nearest_m, least_m), most_m) / nearest_m - self._share)
         if self._last_m is not None:
-            steady = _STEADY + max(_STEADY_PER_S, _STEADY_MPS / self._last_m) * dt_s
             self._changes += gain * (change / steady - self._changes)
             self._followed = agrees or (self._followed and goes_on)
         self._last_m = self.by_width_m = nearest_m
-        self._told_m = told_m
+        self._last_ns, self._told_m = stamp_ns, told_m
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
         return nearest_m if leapt or self._believed_share != 1.0 else told_m
 
-    def _leap(self, dt_s: float) -> float:
-        """By how much more than in `dt_s` what the lines tell does not change, as a share: near the floor any
-        climb changes it by much."""
-        per_s = LEAP_PER_S if self._last_m is None else max(LEAP_PER_S, _RISES_MPS / self._last_m)
-        return LEAP + per_s * dt_s
+    def _rise(self, stamp_ns: int, dt_s: float, per_s: float, mps: float) -> float:
+        """By how much what the lines tell may change in `dt_s`, as a share: near the floor any climb changes
+        it by much.  Not after a gap, in which it may have become another line."""
+        if self._last_m is None or (stamp_ns - self._last_ns) * 1e-9 > _LONGEST_S:
+            return per_s * dt_s
+        return max(per_s * dt_s, math.log1p(mps * dt_s / self._last_m))
 
-    def _left_behind(self, by_width_m: Sequence[float], told_m: float, dt_s: float) -> bool:
+    def _left_behind(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int, dt_s: float) -> bool:
         """A told height that has left those of the lines that are followed is not right again because some
         other line happens to agree with it."""
         last_m = self._last_m
         if last_m is None or not self._followed or self._believed_share == 1.0:
             return False
         same_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
-        goes_on = abs(math.log(same_m / last_m)) < self._leap(dt_s)
+        rise = self._rise(stamp_ns, dt_s, LEAP_PER_S, _RISES_MPS)
+        goes_on = abs(math.log(same_m / last_m)) < LEAP + rise
         return goes_on and abs(told_m / same_m - 1.0) > _DOUBTED
 
     def _change(self, nearest_m: float, share: float) -> float:

@@ -35,9 +35,14 @@ class ClimbLoop:
         self._error_mps2 = 0.0
         self._held = 0.0
 
-    def reset(self, height_m: float, collective: float = 0.0) -> None:
-        """Forget the past and hold `height_m`, from `collective` on: 0 on the floor."""
-        self._wanted_mps = self._wanted_mps2 = 0.0
+    @property
+    def wanted_mps(self) -> float:
+        """The climb rate that is followed at present."""
+        return self._wanted_mps
+
+    def reset(self, height_m: float, collective: float = 0.0, speed_mps: float = 0.0) -> None:
+        """Forget the past and go on from this height, climb and `collective`: 0 on the floor."""
+        self._wanted_mps, self._wanted_mps2 = speed_mps, 0.0
         self._target_m = height_m
         self._error_mps2 = 0.0
         self._held = collective

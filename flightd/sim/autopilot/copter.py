@@ -31,7 +31,9 @@ _RELAYS = 16
 _IDLE_COLLECTIVE = 0.05
 _LAND_DETECT_S = 1.0
 _LEARN_S, _LEARN_MPS, _LEARN_RAD = 10.0, 0.6, math.radians(5.0)
-"""ArduCopter learns what it hovers at within this time, while it climbs and leans by less."""
+"""ArduCopter learns what it hovers at within this time, while it climbs and leans by less and is told to
+hold its height."""
+_HOLDS_MPS, _LEAST_COLLECTIVE = 1e-3, 0.01
 _LEAST_HOVER, _MOST_HOVER = 0.125, 0.6875
 _PAUSE_S = 4.0
 """A failsafe's landing holds the height for so long before it sinks."""
@@ -127,8 +129,7 @@ class ArduCopterPeer(AutopilotPeer):
             self.mode = mode
             self._target = AngleTarget(yaw_rad=self.sensors.yaw_rad)
             self._stick_yaw_rad = self.sensors.yaw_rad
-            self._climb_loop.gains = self._climb_gains()
-            self._climb_loop.reset(self.sensors.height_m, self._collective)
+            self._climb_loop.gains = self._climb_gains()  # a loop that runs goes on as it is
             self._pause_s = 0.0
             self.link.broadcast(self._heartbeat())
         return int(dialect.MAV_RESULT_ACCEPTED)
@@ -260,7 +261,7 @@ class ArduCopterPeer(AutopilotPeer):
             collective = self._hold_climb(dt_s, climb_mps)
         else:
             collective = raw
-            self._climb_loop.reset(self.sensors.height_m, raw)
+            self._climb_loop.reset(self.sensors.height_m, raw, self.sensors.climb_mps)
         self._collective = collective
         self._detect_landing(dt_s, climb_mps, collective)
         self._learn_hover(dt_s)
@@ -313,9 +314,8 @@ class ArduCopterPeer(AutopilotPeer):
         return AirframeCommand(motors=True, collective=_IDLE_COLLECTIVE, yaw_rad=self.airframe.yaw_rad)
 
     def _detect_landing(self, dt_s: float, climb_mps: float, collective: float) -> None:
-        """Down is wanted, the motors are near their minimum, by what it believes to hover at, and nothing
-        moves: for a second."""
-        low = collective < 0.6 * self.parameters["MOT_THST_HOVER"]
+        """Down is wanted, the motors are at their minimum, and nothing moves: for a second."""
+        low = collective <= _LEAST_COLLECTIVE
         still = abs(self.sensors.climb_mps) < 0.15
         self._settled_s = self._settled_s + dt_s if climb_mps < 0.0 and low and still else 0.0
         if self._settled_s >= _LAND_DETECT_S:
@@ -334,7 +334,7 @@ class ArduCopterPeer(AutopilotPeer):
         leans = max(abs(sensors.roll_rad), abs(sensors.pitch_rad)) > _LEARN_RAD
         if self.landed or not parameters["MOT_HOVER_LEARN"] or leans or not self._collective:
             return
-        if abs(sensors.climb_mps) < _LEARN_MPS:
+        if abs(sensors.climb_mps) < _LEARN_MPS and abs(self._climb_loop.wanted_mps) < _HOLDS_MPS:
             guess = parameters["MOT_THST_HOVER"]
             guess += (self._collective - guess) * dt_s / (dt_s + _LEARN_S)
             parameters["MOT_THST_HOVER"] = min(max(guess, _LEAST_HOVER), _MOST_HOVER)

@@ -25,7 +25,7 @@ _STREAM_S = 1.0
 _STREAM_GAP_S = 0.5
 _IDLE_COLLECTIVE = 0.04
 _LAND_DETECT_S = 1.0
-_LOW_SHARE = 0.3
+_LOW_SHARE = 0.1
 """Of the way from MPC_THR_MIN to the hover thrust."""
 _HOVER_S, _LEAST_FELT = 2.0, 0.5
 """The hover thrust is known within this time; of a fall (share of the weight felt) nothing is learnt."""
@@ -122,7 +122,7 @@ class Px4Peer(AutopilotPeer):
         if mode != self.mode:
             self.mode = mode
             self._stick_yaw_rad = self.sensors.yaw_rad
-            self._climb_loop.reset(self.sensors.height_m, self._collective)
+            self._climb_loop.reset(self.sensors.height_m, self._hover, self.sensors.climb_mps)
 
     def _mode_of(self, params: tuple[float, ...]) -> int:
         """DO_SET_MODE carries main and sub mode as parameters 2 and 3."""
@@ -239,13 +239,15 @@ class Px4Peer(AutopilotPeer):
         return roll, pitch, self._stick_yaw_rad, sticks.yaw_rate_radps, collective, climb_mps < 0.0
 
     def _estimate_hover(self, dt_s: float) -> None:
-        """As its hover thrust estimator, which begins anew with each flight."""
-        if self.landed:
+        """As its hover thrust estimator, which begins anew with each flight and learns by its own height loop
+        alone: nothing while this computer holds the height."""
+        if self.landed or self.mode == Px4Mode.OFFBOARD:
             self._hover = self.parameters["MPC_THR_HOVER"]
             return
         felt = 1.0 + self.sensors.accel_mps2 / GRAVITY_MPS2
         if felt > _LEAST_FELT:
-            hovers = self._collective * self.airframe.tilt_cos / felt
+            tilt_cos = math.cos(self.sensors.roll_rad) * math.cos(self.sensors.pitch_rad)
+            hovers = self._collective * tilt_cos / felt
             self._hover += (hovers - self._hover) * min(dt_s / _HOVER_S, 1.0)
 
     def _detect_landing(self, dt_s: float, collective: float, *, down: bool) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from flightd.sim.plant.airframe import Airframe
 
-_CHANGED_FRAC = 1e-6
+_CHANGED_FRAC = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class BatteryMonitor:
 
     The charge is that at power-on less what has been drawn since, of the capacity that is configured: a
     battery that holds less is empty before it is told to be.  What is done to the battery otherwise (another
-    one, a charger's current) is told to the autopilot."""
+    one, a charger's current) is told to the autopilot, and what is full is full."""
 
     def __init__(self, params: MonitorParams) -> None:
         self._params = params
@@ -51,5 +51,6 @@ class BatteryMonitor:
         self._held_frac = now_frac
         self.used_ah += used_ah
         self._charge_frac -= used_ah / p.capacity_ah
-        if abs(changed_frac) > drained_frac + _CHANGED_FRAC:
-            self._charge_frac = self.charge_frac + changed_frac
+        if abs(changed_frac) > _CHANGED_FRAC:
+            is_full = now_frac + drained_frac > 1.0 - _CHANGED_FRAC
+            self._charge_frac = 1.0 if is_full else self.charge_frac + changed_frac

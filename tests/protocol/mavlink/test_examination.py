@@ -98,6 +98,7 @@ def test_a_limit_that_has_another_unit_in_a_newer_version_is_mended_in_that() ->
         assert finding is not None
         assert finding.better == better
         assert judge(rule, (name, better)) is None
+    assert judge(rule, ("WPNAV_ACCEL_Z", 2.5)) is not None
 
 
 def test_px4s_whole_numbers_are_read_and_written_as_bytes() -> None:

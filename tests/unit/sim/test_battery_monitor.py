@@ -56,3 +56,15 @@ def test_what_is_done_to_the_battery_is_told() -> None:
     airframe.battery_frac = 1.0
     flown(airframe, sensors, STEP_S)
     assert sensors.battery.charge_frac == 1.0
+
+
+def test_a_full_battery_is_told_to_be_full_whatever_was_counted_of_the_last_one() -> None:
+    airframe = Airframe(AirframeParams(battery_capacity_ah=0.4), CALM)
+    sensors = Sensors(SensorParams(battery=MonitorParams(0.4, current_share=1.3)))
+    flown(airframe, sensors, 30.0)
+    assert sensors.battery.charge_frac < airframe.battery_frac - 0.05
+    airframe.battery_frac = 1.0
+    for _ in range(3):  # contacts keep it full
+        flown(airframe, sensors, STEP_S)
+        airframe.battery_frac = 1.0
+        assert sensors.battery.charge_frac == pytest.approx(1.0, abs=1e-5)

@@ -254,3 +254,23 @@ def test_a_take_off_by_a_reading_that_sticks_near_the_floor_is_told_by_the_width
         height_m += climb_mps / fps
     assert heights.tell
     assert heights.off_m < -0.25
+
+
+@pytest.mark.parametrize("last_m", [0.12, 0.2])
+def test_a_line_of_another_width_is_not_taken_for_a_climb_that_nobody_saw(last_m: float) -> None:
+    heights = Frames()
+    for _ in range(30):
+        heights.sees([last_m], last_m)
+    for _ in range(24):
+        heights.sees([], 1.0)
+    for _ in range(60):
+        assert heights.sees([0.5], 1.0) == 1.0
+    assert not heights.tell
+
+
+def test_a_line_that_flickers_near_the_floor_with_another_is_not_believed() -> None:
+    heights = Frames()
+    for _ in range(30):
+        heights.sees([0.4], 0.4)
+    for n in range(60):
+        assert heights.sees([0.25 if n % 2 else 0.34], 0.4) == 0.4

@@ -23,7 +23,7 @@ class Rule:
     reason: str
     better: float | None = None
     newer: float | None = None
-    """`better` under its newest name, where that has another unit."""
+    """`better` under its newest name, where that has another unit than what `fits` takes."""
     optional: bool = False
     """Versions that do not have it do as they should."""
     advised: bool = False
@@ -60,11 +60,14 @@ def has_bits(bits: int) -> Callable[[float], bool]:
 
 def judge(rule: Rule, found: tuple[str, float] | None) -> ParameterFinding | None:
     """What is wrong with a parameter as it was read; None when nothing is, or it does not exist."""
-    if found is None or rule.fits(found[1]):
+    if found is None:
         return None
     name, value = found
-    is_newer = rule.newer is not None and name == rule.names[-1]
-    better = rule.newer if is_newer else rule.better
+    better, unit = rule.better, 1.0
+    if better is not None and rule.newer is not None and name == rule.names[-1]:
+        better, unit = rule.newer, better / rule.newer
+    if rule.fits(value * unit):
+        return None
     return ParameterFinding(name, value, rule.expected, rule.reason, better, rule.advised)
 
 

@@ -61,7 +61,7 @@ def _range_finder(sensor: int) -> tuple[Rule, ...]:
 
 _CLIMB = "the climb rate shows a range finder that sticks: it must not come from the same one"
 
-_CLIMBS_ON = "a climb that must end rises 0.2 m more; by the firmware's defaults 0.4 m"
+_CLIMBS_ON = "a climb of 0.8 m/s that must end rises 0.2 m more; by the firmware's defaults 0.4 m"
 
 _ARDUPILOT: tuple[Rule, ...] = (
     Rule(
@@ -146,7 +146,7 @@ _ARDUPILOT: tuple[Rule, ...] = (
     ),
     Rule(
         ("WPNAV_ACCEL_Z", "WP_ACC_Z"),
-        lambda value: 200 <= value <= 500 or 2 <= value <= 5,
+        within(200, 500),
         "200 to 500 cm/s2 (4.7: 2 to 5 m/s2)",
         _CLIMBS_ON,
         250,

@@ -98,7 +98,7 @@ export default {
   "there is no GPS in the hall": "in der Halle gibt es kein GPS",
   "indoors a GPS reports nonsense": "in der Halle meldet ein GPS Unsinn",
   "arming unchecked hides faults": "ungeprüftes Scharfstellen verdeckt Fehler",
-  "a climb that must end rises 0.2 m more; by the firmware's defaults 0.4 m": "ein Steigflug, der enden muss, steigt 0,2 m weiter, mit den Vorgaben der Firmware 0,4 m",
+  "a climb of 0.8 m/s that must end rises 0.2 m more; by the firmware's defaults 0.4 m": "ein Steigflug von 0,8 m/s, der enden muss, steigt 0,2 m weiter, mit den Vorgaben der Firmware 0,4 m",
   "a landing of last resort is blind: it drifts for as long as it takes (1 m/s is a drop of 5 cm)": "eine Notlandung ist blind: Es treibt, solange sie dauert (1 m/s ist ein Fall von 5 cm)",
   "so long the last tilt and thrust are flown on after this computer has died": "so lange werden letzte Neigung und letzter Schub weitergeflogen, wenn dieser Rechner ausfällt",
   "else nothing lands the vehicle when this computer dies: the default, Position, cannot be held without a position": "sonst landet nichts das Fluggerät, wenn dieser Rechner ausfällt: Die Vorgabe, Position, lässt sich ohne Position nicht halten",
