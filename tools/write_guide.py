@@ -77,7 +77,12 @@ def _worlds() -> str:
         ("camera: roll and pitch of the mount, up to", "mount_deg", 1, "deg"),
         ("camera: yaw of the mount, up to", "mount_yaw_deg", 1, "deg"),
         ("camera: focal length off by up to", "focal_share", 1e2, "%"),
-        ("camera: shakes against the attitude, rms", "shake_deg", 1, "deg"),
+        (
+            "camera: shakes against the attitude (`rough`: vibrates by 60 to 200 Hz), rms",
+            "shake_deg",
+            1,
+            "deg",
+        ),
         ("camera: rows read out slower or faster by up to", "readout_s", 1e3, "ms"),
         ("camera: automatic exposure, time constant from", "quickest_exposure_s", 1, "s"),
         ("camera: automatic exposure, time constant up to", "slowest_exposure_s", 1, "s"),

@@ -20,7 +20,6 @@ from flightd.sim.floor.paint_damage import PaintDamage, drawn_damage
 from flightd.sim.floor.strange_lines import drawn_old_lines, drawn_tapes
 from flightd.sim.leap import NEVER, Leap
 from flightd.sim.plant.airframe import AirframeParams
-from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.plant.wash import Wash
 from flightd.sim.plant.wind import WindParams
 from flightd.sim.racks.appearance import RackAppearance
@@ -28,6 +27,7 @@ from flightd.sim.racks.face_light import drawn_light
 from flightd.sim.sensors.cheap_camera import FAITHFUL, CheapParams
 from flightd.sim.sensors.instruments import SensorParams
 from flightd.sim.sensors.optics import SimCamera
+from flightd.sim.sensors.vibration import STILL, Shaken, Tones, Vibration, drawn_tones
 from flightd.site.site import Site
 
 
@@ -59,7 +59,9 @@ class Unknowns:
     mount_yaw_rad: float = 0.0
     focal_share: float = 1.0
     shake_rad: float = 0.0
-    """Rms of roll and pitch of each frame against the airframe."""
+    """Rms of roll and of pitch of the camera against the airframe."""
+    shake_tones: tuple[Tones, Tones] | None = None
+    """The tones of roll and of pitch by which it shakes; None: it is turned anew for each frame."""
     compass_rad: float = 0.0
     """The most by which steel turns the compass."""
     gyro_share: float = 0.0
@@ -125,6 +127,14 @@ class Unknowns:
     worn_look: float = 0.0
     """How far the floor looks worn, from as configured (0) to the harsh appearance (1)."""
 
+    @property
+    def vibration(self) -> Vibration:
+        return STILL if self.shake_tones is None else Vibration(self.shake_rad, *self.shake_tones)
+
+    def shaken(self, seed: int) -> Shaken:
+        """What turns the camera anew for each frame; nothing where it vibrates."""
+        return Shaken(self.shake_rad if self.shake_tones is None else 0.0, seed)
+
     def camera(self, configured: SimCamera) -> SimCamera:
         """The down camera as it really is."""
         lens, mount = configured.lens, configured.mount
@@ -140,6 +150,7 @@ class Unknowns:
             capture_delay_s=max(configured.capture_delay_s + self.camera_delay_s, 0.005),
             jitter_s=configured.jitter_s + self.camera_jitter_s,
             readout_s=max(configured.readout_s + self.readout_s, 0.0),
+            vibration=self.vibration,
         )
 
     def cheap(self, *, told: bool) -> CheapParams:
@@ -191,6 +202,7 @@ class Unknowns:
             range_lag_s=self.range_lag_s,
             range_echo=self.range_echo,
             battery=replace(configured.battery, current_share=self.current_share, volt_share=self.volt_share),
+            vibration=self.vibration,
         )
 
     def radio(self, configured: RadioParams) -> tuple[RadioParams, RadioParams]:
@@ -239,6 +251,7 @@ class Spread:
     mount_yaw_deg: float
     focal_share: float
     shake_deg: float
+    vibrates: bool
     readout_s: float
     compass_deg: float
     gyro_share: float
@@ -293,6 +306,7 @@ SPREADS = {
         mount_yaw_deg=2.0,
         focal_share=0.01,
         shake_deg=0.15,
+        vibrates=False,
         readout_s=0.005,
         compass_deg=5.0,
         gyro_share=0.005,
@@ -345,6 +359,7 @@ SPREADS = {
         mount_yaw_deg=4.0,
         focal_share=0.04,
         shake_deg=0.5,
+        vibrates=True,
         readout_s=0.015,
         compass_deg=25.0,
         gyro_share=0.02,
@@ -419,6 +434,7 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         mount_yaw_rad=math.radians(within(most.mount_yaw_deg)),
         focal_share=1.0 + within(most.focal_share),
         shake_rad=math.radians(most.shake_deg),
+        shake_tones=drawn_tones(random.Random(f"shake {kind} {seed}")) if most.vibrates else None,
         map_error_m=most.map_m,
         tilt_bias_rad=(math.radians(within(most.tilt_deg)), math.radians(within(most.tilt_deg))),
         tilt_wander_rad=math.radians(most.tilt_wander_deg),
@@ -466,18 +482,3 @@ def unknowns_of(kind: WorldKind, seed: int) -> Unknowns:
         tape=most.tape,
         worn_look=most.worn_look,
     )
-
-
-class Shaken:
-    """The airframe's truth as the camera on its soft mount sees it."""
-
-    def __init__(self, rms_rad: float, seed: int) -> None:
-        self._rms_rad = rms_rad
-        self._rng = random.Random(f"shake {seed}")
-
-    def __call__(self, truth: Kinematics) -> Kinematics:
-        if not self._rms_rad:
-            return truth
-        gauss = self._rng.gauss
-        roll_rad = truth.roll_rad + gauss(0.0, self._rms_rad)
-        return replace(truth, roll_rad=roll_rad, pitch_rad=truth.pitch_rad + gauss(0.0, self._rms_rad))

@@ -47,7 +47,7 @@ from flightd.sim.sensors.camera_path import CameraPath
 from flightd.sim.sensors.cheap_camera import FAITHFUL, CheapCamera, CheapParams
 from flightd.sim.sensors.instruments import Goods, SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
-from flightd.sim.unknowns import NOTHING, Shaken, Unknowns
+from flightd.sim.unknowns import NOTHING, Unknowns
 from flightd.site.site import Site
 from flightd.site.site_file import site_toml
 
@@ -173,7 +173,8 @@ class World:
             show = _streaming(spec, recorder, self._opened)
         serves = spec.pads != PadService() and not spec.truth_url
         self._charge_pads = ChargePads(spec.site, airframe, spec.pads) if serves else None
-        self._cameras = {"camera": _down_camera(spec, self._damage, self.vehicle, clock, show, hold, drawn)}
+        truth_at = self.vehicle.truth_at
+        self._cameras = {"camera": down_camera(spec, self._damage, truth_at, clock, show, hold, drawn)}
         if own_front is not None:
             self._cameras["ardrone-front-camera"] = own_front
         if spec.front is not None:
@@ -263,15 +264,16 @@ def _sensors(spec: WorldSpec, configured: SensorParams) -> SensorParams:
     return spec.unknowns.sensors(replace(configured, battery=MonitorParams(spec.battery_ah)))
 
 
-def _down_camera(
+def down_camera(
     spec: WorldSpec,
     damage: PaintDamage,
-    vehicle: VehiclePeer,
+    truth_at: Callable[[int], Kinematics],
     clock: Clock,
     show: Callable[[Image, int], None] | None,
     hold: Hold,
     drawn: Callable[[FrameTicket], None],
 ) -> CameraPeer:
+    """The camera that looks at the floor, as it really is."""
     damage = replace(damage, gaps=damage.gaps + bare_boxes(spec.faults, spec.site))
     camera = spec.unknowns.camera(spec.camera)
     look = replace(spec.appearance, flicker=0.0) if spec.cheap.flicker else spec.appearance
@@ -279,14 +281,13 @@ def _down_camera(
     if spec.cheap != FAITHFUL:
         make = partial(CheapCamera, make, camera, spec.cheap, spec.seed)
     seed, address = f"camera {spec.seed}", spec.camera_address
-    shaken = Shaken(spec.unknowns.shake_rad, spec.seed)
-    leap = spec.unknowns.camera_leap
+    shaken, leap = spec.unknowns.shaken(spec.seed), spec.unknowns.camera_leap
     return CameraPeer(
         camera,
         make,
         seed,
         address,
-        lambda ns: shaken(vehicle.truth_at(ns)),
+        lambda ns: shaken(truth_at(ns)),
         clock,
         show,
         hold=hold,

@@ -10,12 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from flightd.core.camera_view import CameraView
+from flightd.core.distortion import distorted
 from flightd.core.geometry import Matrix
 from flightd.sim.dataset.scenes import FAR, Scene, SceneBand, truth_lines, truth_nodes
 from flightd.sim.floor.paint_damage import Stripe
@@ -30,8 +32,9 @@ _SAMPLES = 161
 _AROUND = 0.25
 """Share of the picture's size around it in which an edge still tells its direction."""
 _SAME_PX = 1.0
-_ROLLS = 5
-"""Rounds in which a row and the time at which it is exposed are brought together."""
+_ROLLS = 12
+"""Rounds in which a row and the time at which it is exposed are brought together; vibration needs more than
+a steady motion."""
 
 
 class FloorSight:
@@ -46,15 +49,20 @@ class FloorSight:
             CameraView(camera.lens, floor_viewpoint(moved(kinematics, sign * half_s), camera.mount))
             for sign in (-1.0, 1.0)
         )
+        self._lens, self._readout_s = camera.lens, camera.readout_s
+        self._turned_rad = partial(camera.turned_rad, kinematics.stamp_ns, over_s=camera.exposure_s)
 
     def pixels(self, points_m: Matrix) -> Matrix:
         """(N, 2) pixels of (N, 2) floor points, each seen when its row is exposed; NaN behind the camera."""
-        floor = np.column_stack([points_m, np.zeros(len(points_m))])
-        first, last = self._first.project(floor), self._last.project(floor)
-        seen: Matrix = (first + last) / 2
+        lens, floor = self._lens, np.column_stack([points_m, np.zeros(len(points_m))])
+        centre, focal = np.array(lens.centre_px), np.array((lens.fx_px, lens.fy_px))
+        first, last = ((view.project_ideal(floor) - centre) / focal for view in (self._first, self._last))
+        seen: Matrix = centre + (first + last) / 2 * focal
         for _ in range(_ROLLS):
             late = np.clip((seen[:, 1:] + 0.5) / self.height, 0.0, 1.0)
-            seen = first + late * (last - first)
+            turned_rad = self._turned_rad((late[:, 0] - 0.5) * self._readout_s)
+            right, down = _turned_back(first + late * (last - first), turned_rad)
+            seen = centre + distorted(np.stack([right, down]), lens).T * focal
         return seen
 
     def is_around(self, pixels: Matrix) -> NDArray[np.bool_]:
@@ -63,6 +71,14 @@ class FloorSight:
         inside = (pixels > -_AROUND * size) & (pixels < (1.0 + _AROUND) * size)
         around: NDArray[np.bool_] = np.logical_and.reduce(inside, axis=1)
         return around
+
+
+def _turned_back(ideal: Matrix, turned_rad: Matrix) -> Matrix:
+    """(2, N) where a camera shows (N, 2) ideal points that is turned by (3, N) angles about its axes."""
+    ahead = np.vstack([ideal.T, np.ones(len(ideal))])
+    seen = ahead - np.cross(turned_rad, ahead, axis=0) + turned_rad * (turned_rad * ahead).sum(axis=0)
+    shown: Matrix = seen[:2] / seen[2]
+    return shown
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,8 @@
 
 Each hall is one that a flight in the rough world might meet: a random site, its lines beside their places,
 paint gone, pallets and drains on it, old lines, tape of other colours, a worn and dirty look, mirrored lamps,
-an automatic exposure that lags, bands of the mains in the rolling shutter, motion blur and shake.  The lens
-alone is one without distortion: a label is a straight line.
+an automatic exposure that lags, bands of the mains in the rolling shutter, motion blur and vibration.  The
+lens alone is one without distortion: a label is a straight line, the nearest to what vibration makes wavy.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.random_sites import random_site
 from flightd.sim.sensors.cheap_camera import CheapCamera
 from flightd.sim.sensors.optics import SimCamera, moved, wide_lens
-from flightd.sim.unknowns import Shaken, WorldKind, unknowns_of
+from flightd.sim.unknowns import WorldKind, unknowns_of
 from flightd.site.site import PaintedLine
 from flightd.vision.training.labelled_frames import LabelledImage
 
@@ -67,9 +67,8 @@ class RoughHall:
         cheap = self._unknowns.cheap(told=False)
         camera = CheapCamera(lambda: self._renderer, self._camera, cheap, self._seed)
         camera.render(moved(flown, -_BEFORE_S), 2 * number)
-        shaken = Shaken(self._unknowns.shake_rad, self._seed * FRAMES_A_HALL + number)(flown)
-        bgr = camera.render(shaken, 2 * number + 1)
-        sight = FloorSight(self._camera, shaken)
+        bgr = camera.render(flown, 2 * number + 1)
+        sight = FloorSight(self._camera, flown)
         lines, nodes = floor_labels(self._stripes, self._hidden, sight, self._faded)
         lens = self._camera.lens
         label = LabelledImage(

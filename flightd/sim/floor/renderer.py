@@ -23,7 +23,7 @@ from flightd.sim.floor.lighting import Lighting
 from flightd.sim.floor.paint_damage import UNDAMAGED, PaintDamage
 from flightd.sim.floor.tiles import Ahead, TiledFloor
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.sensors.camera_effects import Sensor, blur_kernel
+from flightd.sim.sensors.camera_effects import Sensor, blur_kernel, blur_wobbling
 from flightd.sim.sensors.optics import (
     USUALLY,
     Floats,
@@ -34,6 +34,7 @@ from flightd.sim.sensors.optics import (
     moved,
     picture_for,
     smear_px,
+    wobble_px,
 )
 from flightd.site.site import Site
 
@@ -41,6 +42,8 @@ __all__ = ["Appearance", "Renderer", "SimCamera"]
 
 _AHEAD_S = 0.8
 """How far ahead of the view the floor is painted: long enough for a row of tiles, one to a picture."""
+_STRIPS = 9
+"""Of a picture, each blurred by its own way: one is read out in less time than it is usually exposed."""
 _SHADOW_HALF_M = 0.18
 _SHADOW_FADES_M = 0.9
 """Height at which the airframe's shadow below itself has lost most of its depth."""
@@ -76,7 +79,7 @@ class Renderer:
         With `out` (same shape, uint8, contiguous) the picture is written there and `out` returned."""
         picture = picture_for(self._camera.lens, out)
         view = floor_viewpoint(kinematics, self._camera.mount)
-        x_m, y_m = self._looks_at(kinematics, view)
+        x_m, y_m = self._looks_at(kinematics, view, how.exposure)
         foot, footprint_m = (view.x_m, view.y_m), self._rays.footprint_m(view)
         canvas, cells = self._tiles.look(x_m, y_m, foot, footprint_m)
         floor_map = self._rays.to_pixels(cells)
@@ -90,20 +93,30 @@ class Renderer:
         self._tiles.prepare(x_m, y_m, foot, footprint_m, _ahead(kinematics, view))
         return picture
 
-    def _looks_at(self, kinematics: Kinematics, view: Viewpoint) -> tuple[Floats, Floats]:
+    def _looks_at(self, kinematics: Kinematics, view: Viewpoint, exposure: float) -> tuple[Floats, Floats]:
         """The floor points of all cells, relative to the camera's foot."""
-        camera = self._camera
+        camera, rays = self._camera, None
+        if camera.vibration.rms_rad:
+            late_s = (self._rays.late - 0.5) * camera.readout_s
+            over_s = exposure * camera.exposure_s
+            rays = self._rays.turned(camera.turned_rad(kinematics.stamp_ns, late_s, over_s))
         if not camera.readout_s:
-            return self._rays.floor(view)
+            return self._rays.floor(view, rays)
         first, last = (
             floor_viewpoint(moved(kinematics, sign * camera.readout_s / 2), camera.mount)
             for sign in (-1.0, 1.0)
         )
-        return self._rays.rolled(view, first, last)
+        return self._rays.rolled(view, first, last, rays)
 
     def _smear(self, picture: Image, kinematics: Kinematics, exposure: float) -> None:
-        across, down = smear_px(self._camera, kinematics) if self._look.motion_blur else (0.0, 0.0)
-        kernel = blur_kernel((across * exposure, down * exposure), self._look.soft_px)
+        camera, moves = self._camera, self._look.motion_blur
+        across, down = smear_px(camera, kinematics) if moves else (0.0, 0.0)
+        smear = across * exposure, down * exposure
+        if moves and camera.vibration.rms_rad:
+            wobble = wobble_px(camera, kinematics.stamp_ns, exposure, _STRIPS if camera.readout_s else 1)
+            blur_wobbling(picture, smear, wobble, self._look.soft_px)
+            return
+        kernel = blur_kernel(smear, self._look.soft_px)
         if kernel is not None:
             cv2.filter2D(picture, -1, kernel, dst=picture, borderType=cv2.BORDER_REPLICATE)
 

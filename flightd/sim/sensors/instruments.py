@@ -13,6 +13,7 @@ from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.sensors.battery_monitor import BatteryMonitor, MonitorParams
 from flightd.sim.sensors.steel_field import SteelField
+from flightd.sim.sensors.vibration import STILL, Vibration
 
 
 class Goods(NamedTuple):
@@ -65,8 +66,15 @@ class SensorParams:
     """Share of readings that came back by a longer way."""
     goods: Sequence[Goods] = ()
     battery: MonitorParams = field(default_factory=MonitorParams)
+    vibration: Vibration = STILL
+    """That of the camera on its mount, of which the airframe has a part."""
 
 
+_AIRFRAME_SHARE = 0.1
+"""The airframe turns by so much of what it shakes the camera: half a degree of it would be 300 deg/s on its
+gyros at 100 Hz, ten times what flight logs show of a drone that still flies."""
+_GYRO_FILTER_HZ = 40.0
+"""What autopilots leave of it: PX4's IMU_GYRO_CUTOFF as it is shipped; ArduCopter's INS_GYRO_FILTER is 20."""
 _LEAST_COS = 0.3
 """Leaned over further, nothing comes back."""
 _LONGER_WAY = 1.15, 1.8
@@ -125,6 +133,7 @@ class Sensors:
         self._climb_mps: float | None = None
         self.battery = BatteryMonitor(p.battery)
         self._below_m: float | None = None
+        self._elapsed_s = 0.0
 
     @property
     def told_climb_mps(self) -> float:
@@ -160,6 +169,7 @@ class Sensors:
     def update(self, dt_s: float, airframe: Airframe) -> None:
         """Follow the airframe's present truth after `dt_s`."""
         p, gauss = self.params, self._rng.gauss
+        self._elapsed_s += dt_s
         fade = dt_s / p.wander_s
         kick = math.sqrt(2.0 * fade)
         self._roll_wander += -self._roll_wander * fade + gauss(0.0, p.tilt_wander_rad * kick)
@@ -205,15 +215,17 @@ class Sensors:
         self._pitch_leak -= part * (airframe.pitch_rad + self._pitch_leak - felt_pitch)
 
     def body_rates_radps(self, truth: Kinematics) -> tuple[float, float, float]:
-        """What the gyros feel about the body's axes, less what the estimator knows of their biases; that of
+        """What the gyros tell about the body's axes, less what the estimator knows of their biases; that of
         the yaw has the bias by which the heading drifts."""
+        shakes = self.params.vibration.filtered_rates_radps(self._elapsed_s, _GYRO_FILTER_HZ)
         gauss, scale, noise = self._gyro_rng.gauss, self._gyro_scale, self.params.gyro_noise_radps
         roll, pitch, yaw = (
             scale * rate + gauss(0.0, noise)
             for rate in (truth.roll_rate_radps, truth.pitch_rate_radps, truth.yaw_rate_radps)
         )
         bias_roll, bias_pitch = self.params.tilt_rate_bias_radps
-        return roll + bias_roll, pitch + bias_pitch, yaw + self._yaw_drift
+        by_roll, by_pitch = (_AIRFRAME_SHARE * rate for rate in shakes)
+        return roll + bias_roll + by_roll, pitch + bias_pitch + by_pitch, yaw + self._yaw_drift
 
     def noisy_yaw_rad(self) -> float:
         """The yaw estimate as a telemetry sample: with its noise."""

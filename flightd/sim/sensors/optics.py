@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from flightd.core.camera_view import AnyMount, Viewpoint
 from flightd.core.distortion import undistorted
-from flightd.core.geometry import Lens, Mount
+from flightd.core.geometry import Lens, Matrix, Mount
 from flightd.core.types import Image
 from flightd.sim.plant.kinematics import Kinematics
+from flightd.sim.sensors.vibration import STILL, Vibration
 
 Floats: TypeAlias = NDArray[np.float32]
 Cells = TypeVar("Cells", NDArray[np.float32], NDArray[np.uint8])
@@ -26,6 +27,9 @@ MIN_HEIGHT_M = 0.02
 """A camera standing on the floor still looks from somewhere."""
 MIN_SLOPE = 0.08
 """Rays that hardly go down are bent to this (down per unit of ray), so that the horizon stays finite."""
+
+_MOMENTS = 24
+"""Of an exposure: what vibration sweeps in it is left without gaps."""
 
 
 def wide_lens(width_px: int = 640, height_px: int = 360, hfov_rad: float = math.radians(80.0)) -> Lens:
@@ -39,7 +43,7 @@ def wide_lens(width_px: int = 640, height_px: int = 360, hfov_rad: float = math.
 class SimCamera:
     """A down camera: its optics and its timing.  A frame reaches the daemon `capture_delay_s` after
     mid-exposure of the middle row, and up to `jitter_s` later, drawn evenly; the rows are exposed one after
-    the other within `readout_s`."""
+    the other within `readout_s`.  The motors shake it on its mount by the `vibration`."""
 
     lens: Lens = field(default_factory=wide_lens)
     mount: Mount = field(default_factory=Mount)
@@ -48,10 +52,19 @@ class SimCamera:
     capture_delay_s: float = 0.060
     jitter_s: float = 0.003
     readout_s: float = 0.0
+    vibration: Vibration = STILL
 
     def __post_init__(self) -> None:
         if not 0.0 < self.exposure_s <= 1.0 / self.fps:
             raise ValueError(f"exposure {self.exposure_s} s does not fit {self.fps} frames a second")
+
+    def turned_rad(self, stamp_ns: int, after_s: Matrix, over_s: float = 0.0) -> Matrix:
+        """By what vibration turns it about its own axes (right, down, optical), (3, ...), so long (...) after
+        `stamp_ns`, on average over an exposure of `over_s`."""
+        roll_rad, pitch_rad = self.vibration.angles_rad(stamp_ns * 1e-9 + after_s, over_s)
+        body_rad = np.stack([roll_rad, pitch_rad, np.zeros_like(roll_rad)])
+        turned: Matrix = np.tensordot(self.mount.body_from_image().T, body_rad, axes=1)
+        return turned
 
 
 def floor_viewpoint(kinematics: Kinematics, mount: Mount) -> Viewpoint:
@@ -77,24 +90,42 @@ class RayTable:
         v = (np.arange(rows) - 1) * CELL_PX + (CELL_PX - 1) / 2
         grid = np.stack(np.meshgrid((u - lens.cx_px) / lens.fx_px, (v - lens.cy_px) / lens.fy_px))
         self._rays: Floats = undistorted(grid, lens).astype(np.float32)
+        self.late: Matrix = np.clip((np.arange(rows) - 0.5) * CELL_PX / lens.height_px, 0.0, 1.0)
+        """(rows,) which part of the read-out has passed at each row of cells."""
         self._padded = np.empty((rows * CELL_PX, columns * CELL_PX, 2), np.float32)
 
-    def floor(self, view: Viewpoint) -> tuple[Floats, Floats]:
-        """Floor points (x_m, y_m relative to the camera's foot) under the cells, each (rows, columns)."""
-        a = view.map_from_image.astype(np.float32)
+    def turned(self, by_rad: Matrix) -> Floats:
+        """(2, rows, columns) the rays where the camera is turned by (3, rows) small angles about its axes,
+        each row of cells by its own."""
         right, down = self._rays
+        about_right, about_down, about_optical = by_rad.astype(np.float32)[..., None]
+        depth = 1.0 + about_right * down - about_down * right
+        turned: Floats = np.stack(
+            [
+                (right + about_down - about_optical * down) / depth,
+                (down + about_optical * right - about_right) / depth,
+            ]
+        )
+        return turned
+
+    def floor(self, view: Viewpoint, rays: Floats | None = None) -> tuple[Floats, Floats]:
+        """Floor points (x_m, y_m relative to the camera's foot) under the cells, each (rows, columns); `rays`
+        are those that `turned` has, None: the camera sits still."""
+        a = view.map_from_image.astype(np.float32)
+        right, down = self._rays if rays is None else rays
         depth = a[2, 0] * right + a[2, 1] * down + a[2, 2]
         scale = np.float32(view.height_m) / np.maximum(depth, np.float32(MIN_SLOPE))
         x = (a[0, 0] * right + a[0, 1] * down + a[0, 2]) * scale
         y = (a[1, 0] * right + a[1, 1] * down + a[1, 2]) * scale
         return x, y
 
-    def rolled(self, view: Viewpoint, first: Viewpoint, last: Viewpoint) -> tuple[Floats, Floats]:
+    def rolled(
+        self, view: Viewpoint, first: Viewpoint, last: Viewpoint, rays: Floats | None = None
+    ) -> tuple[Floats, Floats]:
         """As `floor`, relative to the foot of `view`, where each row has its own time: the uppermost
         looks from `first`, the lowest from `last`."""
-        rows_px = (np.arange(self._rays.shape[1]) - 0.5) * CELL_PX
-        late = np.clip(rows_px / self._lens.height_px, 0.0, 1.0).astype(np.float32)[:, None]
-        (x0, y0), (x1, y1) = self.floor(first), self.floor(last)
+        late = self.late.astype(np.float32)[:, None]
+        (x0, y0), (x1, y1) = self.floor(first, rays), self.floor(last, rays)
         x0, x1 = x0 + np.float32(first.x_m - view.x_m), x1 + np.float32(last.x_m - view.x_m)
         y0, y1 = y0 + np.float32(first.y_m - view.y_m), y1 + np.float32(last.y_m - view.y_m)
         return x0 + late * (x1 - x0), y0 + late * (y1 - y0)
@@ -124,6 +155,17 @@ def smear_px(camera: SimCamera, kinematics: Kinematics) -> tuple[float, float]:
     point = np.array([start.x_m - end.x_m, start.y_m - end.y_m, end.height_m - start.height_m]) + axis * reach
     right, down, depth = end.map_from_image.T @ point
     return camera.lens.fx_px * float(right / depth), camera.lens.fy_px * float(down / depth)
+
+
+def wobble_px(camera: SimCamera, stamp_ns: int, exposure: float, strips: int) -> Matrix:
+    """(strips, moments, 2) how far (right, down) vibration moves what each of as many equal strips of rows
+    shows, from its place on average and in the course of its exposure; `exposure` as in `Taking`."""
+    moments = ((np.arange(_MOMENTS) + 0.5) / _MOMENTS - 0.5) * exposure * camera.exposure_s
+    rows = ((np.arange(strips) + 0.5) / strips - 0.5) * camera.readout_s
+    about_right, about_down, _ = camera.turned_rad(stamp_ns, rows[:, None] + moments)
+    moved_px = np.stack([-camera.lens.fx_px * about_down, camera.lens.fy_px * about_right], axis=-1)
+    wobble: Matrix = moved_px - moved_px.mean(axis=1, keepdims=True)
+    return wobble
 
 
 def moved(k: Kinematics, dt_s: float) -> Kinematics:

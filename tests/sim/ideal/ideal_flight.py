@@ -43,7 +43,8 @@ from flightd.sim.plant.wind import WindParams
 from flightd.sim.sensors.battery_monitor import MonitorParams
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
-from flightd.sim.unknowns import Shaken, Unknowns
+from flightd.sim.sensors.vibration import Shaken
+from flightd.sim.unknowns import Unknowns
 from flightd.site.site import Site
 from tests.sim.ideal.ideal_front import IdealFront
 from tests.sim.ideal.ideal_link import IdealLink

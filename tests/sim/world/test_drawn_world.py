@@ -40,8 +40,8 @@ def cameras(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     return made
 
 
-def rough(tmp_path: Path, vehicle: str) -> Simulation:
-    options = SimOptions(world="rough", seed=SEED, vehicle=vehicle)
+def rough(tmp_path: Path, vehicle: str, world: str = "rough") -> Simulation:
+    options = SimOptions(world=world, seed=SEED, vehicle=vehicle)
     return prepare(options, Scenario(), tmp_path, lambda _: None)
 
 
@@ -83,6 +83,20 @@ def test_the_camera_is_drawn_shaken_and_leaps(tmp_path: Path, cameras: list[dict
         assert down["camera"].jitter_s == configured.jitter_s + drawn.camera_jitter_s
         assert down["leap"] == drawn.camera_leap
         assert abs(drawn.camera_leap.by_s) > 0.01
+        assert down["camera"].vibration == drawn.vibration
+        assert drawn.vibration.rms_rad > 0.0
+        now_ns = LoopClock().now_ns()
+        assert down["truth_at"](now_ns) == world.vehicle.truth_at(now_ns), "it vibrates within the frame"
+
+    virtual(main())
+
+
+def test_the_usual_camera_is_turned_anew_for_each_frame(
+    tmp_path: Path, cameras: list[dict[str, Any]]
+) -> None:
+    async def main() -> None:
+        simulation = rough(tmp_path, "ardupilot", "usual")
+        world, down = world_of(simulation), cameras[0]
         shaken = list[float]()
         for _ in range(300):
             await asyncio.sleep(0.033)
@@ -90,6 +104,6 @@ def test_the_camera_is_drawn_shaken_and_leaps(tmp_path: Path, cameras: list[dict
             seen, true = down["truth_at"](now_ns), world.vehicle.truth_at(now_ns)
             shaken.append(seen.roll_rad - true.roll_rad)
         rms_rad = math.sqrt(statistics.fmean(one * one for one in shaken))
-        assert rms_rad == pytest.approx(drawn.shake_rad, rel=0.3)
+        assert rms_rad == pytest.approx(simulation.unknowns.shake_rad, rel=0.3)
 
     virtual(main())
