@@ -225,7 +225,7 @@ class ReferenceGenerator:
         top_m = self._low.top_m(s)
         rate = self._touchdown.rate_mps(s, _target(s, task))
         if rate > 0.0 and not self._steers:  # what drifts unseen should not do so for long
-            rate = self._blind.rate_mps(s.believed_height_m - top_m)
+            rate = self._blind.rate_mps(self._unheard.height_m(s) - top_m)
         elif top_m > 0.0 and not s.believed_height_m > top_m + p.expert.touch_below_m:
             rate = min(rate, p.expert.touch_mps)
         self._height.reset(0.0 if math.isnan(s.height_m) else s.height_m, -rate)

@@ -198,6 +198,13 @@ class UnheardDescent:
         self._hold_s = params.telemetry_hold_s
         self._left_m = math.inf
 
+    def height_m(self, s: MissionInputs) -> float:
+        """What is believed of the height: of one that is not heard, what it was commanded to have left; NaN
+        where it is not known."""
+        if s.telemetry_age_s <= self._hold_s:
+            return s.believed_height_m
+        return self._left_m if math.isfinite(self._left_m) else math.nan
+
     def step(self, s: MissionInputs, sink_mps: float) -> bool:
         """Whether it should stand, after sinking at that rate for this tick."""
         if s.telemetry_age_s > self._hold_s:

@@ -265,3 +265,15 @@ def test_one_that_loses_its_height_high_up_is_down_within_twenty_seconds() -> No
     assert begun_s < found_s < down_s < found_s + 20.0
     touched = [k for k in truth if down_s - 0.3 < k.stamp_ns * 1e-9 < down_s]
     assert min(k.climb_mps for k in touched) > -0.45
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_one_that_is_not_heard_any_more_is_soon_down_by_what_it_was_commanded_to_sink(seed: int) -> None:
+    """It drifts until then; its last height is known, and what it is told since."""
+    flown, _ = fly(TRIALS["telemetry_lost"], seed)
+    landing = [k.height_m for phase, k in flown.truth if phase is Phase.LAND]
+    assert landing[0] > 1.3
+    down = next(i for i, height_m in enumerate(landing) if height_m < 0.13)
+    assert down * 0.02 < 2.9
+    speeds = [(landing[i] - landing[i + 1]) / 0.02 for i in range(down)]
+    assert max(speeds[-5:]) < 0.6
