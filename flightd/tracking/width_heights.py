@@ -34,6 +34,8 @@ finder cannot measure: what its least reading is off from there is no error of t
 _RISES_MPS = 1.5
 _STEADY_MPS = 1.0
 """No take-off climbs faster, so near the floor its heights change by no more; as a rule by two thirds."""
+_GAP_S = 0.5
+"""A gap without lines counts as one of so long at most."""
 _RANGE_LAG_S, _DELAY_SIGMAS = 0.1, 2.0
 """A range finder tells the height of so long before its stamp, as a rule at most: what it averages over.  A
 frame is of so many standard deviations of its delay earlier or later at most."""
@@ -106,8 +108,8 @@ class WidthHeights:
         share = told_m / nearest_m
         change = self._change(nearest_m, share)
         gain = _gain(dt_s)
-        goes_on = change < LEAP + self._rise(stamp_ns, dt_s, LEAP_PER_S, _RISES_MPS)
-        steady = _STEADY + self._rise(stamp_ns, dt_s, _STEADY_PER_S, _STEADY_MPS)
+        goes_on = change < LEAP + self._rise(told_m, stamp_ns, dt_s, LEAP_PER_S, _RISES_MPS)
+        steady = _STEADY + self._rise(told_m, stamp_ns, dt_s, _STEADY_PER_S, _STEADY_MPS)
         self._stamp_ns = stamp_ns
         if agrees or (self._judged and goes_on):
             if not self._judged:
@@ -128,12 +130,17 @@ class WidthHeights:
         leapt = self._followed and abs(share - 1.0) > _DOUBTED
         return nearest_m if leapt or self._believed_share != 1.0 else told_m
 
-    def _rise(self, stamp_ns: int, dt_s: float, per_s: float, mps: float) -> float:
+    def _rise(self, told_m: float, stamp_ns: int, dt_s: float, per_s: float, mps: float) -> float:
         """By how much what the lines tell may change in `dt_s`, as a share: near the floor any climb changes
-        it by much.  Not after a gap, in which it may have become another line."""
-        if self._last_m is None or (stamp_ns - self._last_ns) * 1e-9 > _LONGEST_S:
+        it by much.  Not after a gap, in which it may have become another line, unless what is told stood
+        still near the floor meanwhile: it may be stuck there."""
+        if self._last_m is None:
             return per_s * dt_s
-        return max(per_s * dt_s, math.log1p(mps * dt_s / self._last_m))
+        since_s = (stamp_ns - self._last_ns) * 1e-9
+        stuck = told_m < _LOW_M and abs(told_m / self._told_m - 1.0) < _AGREEING
+        if since_s > _LONGEST_S and not stuck:
+            return per_s * dt_s
+        return max(per_s * dt_s, math.log1p(mps * min(since_s, _GAP_S) / self._last_m))
 
     def _left_behind(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int, dt_s: float) -> bool:
         """A told height that has left those of the lines that are followed is not right again because some
@@ -142,7 +149,7 @@ class WidthHeights:
         if last_m is None or not self._followed or self._believed_share == 1.0:
             return False
         same_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
-        rise = self._rise(stamp_ns, dt_s, LEAP_PER_S, _RISES_MPS)
+        rise = self._rise(told_m, stamp_ns, dt_s, LEAP_PER_S, _RISES_MPS)
         goes_on = abs(math.log(same_m / last_m)) < LEAP + rise
         return goes_on and abs(told_m / same_m - 1.0) > _DOUBTED
 

@@ -33,7 +33,9 @@ _LAND_DETECT_S = 1.0
 _LEARN_S, _LEARN_MPS, _LEARN_RAD = 10.0, 0.6, math.radians(5.0)
 """ArduCopter learns what it hovers at within this time, while it climbs and leans by less and is told to
 hold its height."""
-_HOLDS_MPS, _LEAST_COLLECTIVE = 1e-3, 0.01
+_HOLDS_MPS = 1e-3
+_LEAST_COLLECTIVE = 0.01
+"""Down to here the motors are at their least, without which nothing has landed (`limit.throttle_lower`)."""
 _LEAST_HOVER, _MOST_HOVER = 0.125, 0.6875
 _PAUSE_S = 4.0
 """A failsafe's landing holds the height for so long before it sinks."""

@@ -241,8 +241,9 @@ class Px4Peer(AutopilotPeer):
     def _estimate_hover(self, dt_s: float) -> None:
         """As its hover thrust estimator, which begins anew with each flight and learns by its own height loop
         alone: nothing while this computer holds the height."""
-        if self.landed or self.mode == Px4Mode.OFFBOARD:
+        if self.landed:
             self._hover = self.parameters["MPC_THR_HOVER"]
+        if self.landed or self.mode == Px4Mode.OFFBOARD:
             return
         felt = 1.0 + self.sensors.accel_mps2 / GRAVITY_MPS2
         if felt > _LEAST_FELT:

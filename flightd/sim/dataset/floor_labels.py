@@ -29,6 +29,8 @@ from flightd.vision.training.labelled_frames import LabelledLine, LabelledNode
 _SIGHT = 2.5
 """How far aside paint is looked for, in heights: beyond what a tilted picture reaches."""
 _SAMPLES = 161
+_SEEN = 5
+"""So many samples of an edge in the picture tell it; of fewer those around it do, too."""
 _AROUND = 0.25
 """Share of the picture's size around it in which an edge still tells its direction."""
 _SAME_PX = 1.0
@@ -65,10 +67,10 @@ class FloorSight:
             seen = centre + distorted(np.stack([right, down]), lens).T * focal
         return seen
 
-    def is_around(self, pixels: Matrix) -> NDArray[np.bool_]:
-        """(N,) whether pixels lie in the picture or near it."""
+    def is_around(self, pixels: Matrix, near: float = _AROUND) -> NDArray[np.bool_]:
+        """(N,) whether pixels lie in the picture or near it, by that share of its size."""
         size = np.array([self.width, self.height])
-        inside = (pixels > -_AROUND * size) & (pixels < (1.0 + _AROUND) * size)
+        inside = (pixels > -near * size) & (pixels < (1.0 + near) * size)
         around: NDArray[np.bool_] = np.logical_and.reduce(inside, axis=1)
         return around
 
@@ -200,7 +202,9 @@ def _band(stripe: Stripe, piece: _Piece, sight: FloorSight) -> SceneBand | None:
         return None
     centred = [edge - ((sight.width - 1) / 2, (sight.height - 1) / 2) for edge in edges]
     way = centred[0][-1] - centred[0][0]
-    lines = [_edge_line(edge[near], way) for edge, near in zip(centred, around, strict=True)]
+    seen = [sight.is_around(edge, 0.0) for edge in edges]  # beyond it nothing vibrates as rows do
+    seen = [within if within.sum() >= _SEEN else near for within, near in zip(seen, around, strict=True)]
+    lines = [_edge_line(edge[of], way) for edge, of in zip(centred, seen, strict=True)]
     normal, rho = lines[0][0] + lines[1][0], lines[0][1] + lines[1][1]
     normal_x, normal_y = map(float, normal)
     centre = (centred[0] + centred[1]) / 2

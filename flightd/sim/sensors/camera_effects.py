@@ -138,7 +138,7 @@ def blur_wobbling(picture: Image, smear_px: tuple[float, float], wobble_px: Matr
     of `wobble_px` (strips, moments of the exposure, 2), which leaves its mean in place.
 
     The axes wobble by tones of their own, so it is done by columns and by rows, at a quarter of the time; a
-    smear that is oblique is laid first."""
+    smear that is oblique is laid first, as if it had nothing to do with them."""
     if min(map(abs, smear_px)) > _OBLIQUE_PX:
         kernel = blur_kernel(smear_px, soft_px)
         if kernel is not None:
@@ -159,7 +159,8 @@ def blur_wobbling(picture: Image, smear_px: tuple[float, float], wobble_px: Matr
 
 def _way_kernel(way_px: Matrix, soft_px: float) -> Floats:
     """Of one axis: a pixel is lit by all that comes over it by the (N,) places of a way, softened.  A place
-    between pixels is shared by both, so that the mean of them all stays where it is."""
+    between pixels is shared by both, so that the mean of them all stays where it is.  For a correlation, as
+    OpenCV filters: what comes from one side stands on the other."""
     half = max(1, math.ceil(float(np.abs(way_px).max())))
     shared = np.clip(1.0 - np.abs(np.arange(-half, half + 1) + way_px[:, None]), 0.0, None)
     reach = math.ceil(1.6 * soft_px)

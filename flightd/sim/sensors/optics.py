@@ -29,7 +29,7 @@ MIN_SLOPE = 0.08
 """Rays that hardly go down are bent to this (down per unit of ray), so that the horizon stays finite."""
 
 _MOMENTS = 24
-"""Of an exposure: what vibration sweeps in it is left without gaps."""
+"""Of an exposure as it is configured, of a longer one more: what vibration sweeps is left without gaps."""
 
 
 def wide_lens(width_px: int = 640, height_px: int = 360, hfov_rad: float = math.radians(80.0)) -> Lens:
@@ -159,8 +159,10 @@ def smear_px(camera: SimCamera, kinematics: Kinematics) -> tuple[float, float]:
 
 def wobble_px(camera: SimCamera, stamp_ns: int, exposure: float, strips: int) -> Matrix:
     """(strips, moments, 2) how far (right, down) vibration moves what each of as many equal strips of rows
-    shows, from its place on average and in the course of its exposure; `exposure` as in `Taking`."""
-    moments = ((np.arange(_MOMENTS) + 0.5) / _MOMENTS - 0.5) * exposure * camera.exposure_s
+    shows in the picture's middle, from its place on average and in the course of its exposure; `exposure` as
+    in `Taking`."""
+    count = math.ceil(_MOMENTS * max(exposure, 1.0))
+    moments = ((np.arange(count) + 0.5) / count - 0.5) * exposure * camera.exposure_s
     rows = ((np.arange(strips) + 0.5) / strips - 0.5) * camera.readout_s
     about_right, about_down, _ = camera.turned_rad(stamp_ns, rows[:, None] + moments)
     moved_px = np.stack([-camera.lens.fx_px * about_down, camera.lens.fy_px * about_right], axis=-1)

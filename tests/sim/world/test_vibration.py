@@ -28,6 +28,7 @@ from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.scenario.scenario import Scenario
+from flightd.sim.sensors.camera_effects import blur_wobbling
 from flightd.sim.sensors.cheap_camera import FAITHFUL
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
@@ -144,6 +145,16 @@ def moments_px(picture: Image) -> tuple[Matrix, Matrix]:
     mean = (paint * at_px).sum(axis=1) / all_of_it
     variance = (paint * (at_px - mean[:, None]) ** 2).sum(axis=1) / all_of_it
     return mean, variance
+
+
+def test_what_is_swept_lies_on_the_side_where_the_camera_saw_it() -> None:
+    """A point seen 1 px to the right for five sixths of the exposure, 5 px to the left for the rest."""
+    picture = np.zeros((9, 41), np.uint8)
+    picture[:, 20] = 240
+    way_px = np.zeros((1, 24, 2))
+    way_px[0, :20, 0], way_px[0, 20:, 0] = 1.0, -5.0
+    blur_wobbling(picture, (0.0, 0.0), way_px, 0.0)
+    assert (picture[4, 21], picture[4, 15]) == (200, 40)
 
 
 def test_a_row_is_blurred_by_what_its_own_exposure_sweeps() -> None:

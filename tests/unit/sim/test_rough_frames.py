@@ -117,9 +117,10 @@ def test_the_paint_lies_where_the_labels_say(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_labels_tell_where_the_paint_is_on_average_while_the_camera_vibrates() -> None:
-    """Within a pixel: an edge is seen where the camera lingers, not at the mean of what it sweeps, 9 px."""
+    """Nearly: an edge is seen where the camera lingers, not at the mean of what it sweeps, 9 px."""
     score = found_in(*(RoughHall(seed, WIDTH, HEIGHT, "yellow") for seed in range(2)))
-    assert np.median(score.rho_px()) < 1.0
+    assert np.median(score.rho_px()) < 0.8
+    assert np.quantile(score.rho_px(), 0.9) < 2.5
     assert np.median(np.degrees(score.theta_rad())) < 0.1
 
 

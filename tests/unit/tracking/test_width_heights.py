@@ -244,12 +244,18 @@ def test_near_the_floor_a_line_that_comes_and_goes_tells_no_height() -> None:
     assert heights.height_m([0.4], 0.0, 41 * 33_000_000) == 0.0
 
 
-@pytest.mark.parametrize("fps", [12.0, 15.0, 30.0])
-def test_a_take_off_by_a_reading_that_sticks_near_the_floor_is_told_by_the_widths(fps: float) -> None:
-    """There a climb of ordinary speed changes what the lines tell by a quarter from frame to frame."""
+@pytest.mark.parametrize("gap_at_m", [math.inf, 0.15, 0.25, 0.5])
+@pytest.mark.parametrize("fps", [10.0, 12.0, 15.0, 30.0])
+def test_a_take_off_by_a_reading_that_sticks_near_the_floor_is_told_by_the_widths(
+    fps: float, gap_at_m: float
+) -> None:
+    """There a climb of ordinary speed changes what the lines tell by a quarter from frame to frame, and more
+    where they are not seen for a quarter of a second."""
     heights, height_m, climb_mps = Frames(fps), 0.1, 0.0
-    while height_m < 0.9:
-        heights.sees([height_m], 0.1)
+    gap = 0
+    while height_m < 1.0:
+        gap += height_m > gap_at_m
+        heights.sees([] if 0 < gap <= fps / 4 else [height_m], 0.1)
         climb_mps = min(climb_mps + 1.3 / fps, 1.1)
         height_m += climb_mps / fps
     assert heights.tell
