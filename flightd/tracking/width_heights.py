@@ -99,7 +99,8 @@ class WidthHeights:
         nearest_m = min(by_width_m, key=lambda height_m: abs(height_m - told_m))  # one that agrees is enough
         dt_s = min((stamp_ns - self._stamp_ns) * 1e-9, _LONGEST_S)
         agrees = abs(told_m / nearest_m - 1.0) < _AGREEING
-        agrees = agrees and not self._left_behind(by_width_m, told_m, stamp_ns, dt_s)
+        leap = LEAP + self._rise(told_m, stamp_ns, dt_s, LEAP_PER_S, _RISES_MPS)
+        agrees = agrees and not self._left_behind(by_width_m, told_m, leap)
         if not agrees and nearest_m < told_m < _UNMEASURED_M:
             return told_m / self._believed_share
         if self._last_m is not None and not agrees:  # it is no better for being nearer to what is wrong
@@ -108,7 +109,7 @@ class WidthHeights:
         share = told_m / nearest_m
         change = self._change(nearest_m, share)
         gain = _gain(dt_s)
-        goes_on = change < LEAP + self._rise(told_m, stamp_ns, dt_s, LEAP_PER_S, _RISES_MPS)
+        goes_on = change < leap
         steady = _STEADY + self._rise(told_m, stamp_ns, dt_s, _STEADY_PER_S, _STEADY_MPS)
         self._stamp_ns = stamp_ns
         if agrees or (self._judged and goes_on):
@@ -142,15 +143,14 @@ class WidthHeights:
             return per_s * dt_s
         return max(per_s * dt_s, math.log1p(mps * min(since_s, _GAP_S) / self._last_m))
 
-    def _left_behind(self, by_width_m: Sequence[float], told_m: float, stamp_ns: int, dt_s: float) -> bool:
+    def _left_behind(self, by_width_m: Sequence[float], told_m: float, leap: float) -> bool:
         """A told height that has left those of the lines that are followed is not right again because some
         other line happens to agree with it."""
         last_m = self._last_m
         if last_m is None or not self._followed or self._believed_share == 1.0:
             return False
         same_m = min(by_width_m, key=lambda height_m: abs(height_m - last_m))
-        rise = self._rise(told_m, stamp_ns, dt_s, LEAP_PER_S, _RISES_MPS)
-        goes_on = abs(math.log(same_m / last_m)) < LEAP + rise
+        goes_on = abs(math.log(same_m / last_m)) < leap
         return goes_on and abs(told_m / same_m - 1.0) > _DOUBTED
 
     def _change(self, nearest_m: float, share: float) -> float:

@@ -196,21 +196,19 @@ class UnheardDescent:
 
     def __init__(self, params: MissionConfig) -> None:
         self._hold_s = params.telemetry_hold_s
-        self._left_m = math.inf
+        self._left_m = math.nan
 
     def height_m(self, s: MissionInputs) -> float:
         """What is believed of the height: of one that is not heard, what it was commanded to have left; NaN
         where it is not known."""
-        if s.telemetry_age_s <= self._hold_s:
-            return s.believed_height_m
-        return self._left_m if math.isfinite(self._left_m) else math.nan
+        return s.believed_height_m if s.telemetry_age_s <= self._hold_s else self._left_m
 
     def step(self, s: MissionInputs, sink_mps: float) -> bool:
         """Whether it should stand, after sinking at that rate for this tick."""
         if s.telemetry_age_s > self._hold_s:
             self._left_m -= sink_mps * s.dt_s
         else:
-            self._left_m = s.believed_height_m if math.isfinite(s.believed_height_m) else math.inf
+            self._left_m = s.believed_height_m if math.isfinite(s.believed_height_m) else math.nan
         return self._left_m < -_UNHEARD_M
 
 

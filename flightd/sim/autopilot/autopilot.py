@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import abc
 import asyncio
-import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -342,7 +341,7 @@ class AutopilotPeer(abc.ABC):
             height_m=sensors.height_m,
             speed_mps=sensors.climb_mps,
             accel_mps2=sensors.accel_mps2,
-            tilt_cos=math.cos(sensors.roll_rad) * math.cos(sensors.pitch_rad),
+            tilt_cos=sensors.tilt_cos,
         )
 
     def _fly(

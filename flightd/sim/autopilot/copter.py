@@ -97,7 +97,6 @@ class ArduCopterPeer(AutopilotPeer):
         super().__init__(clock, airframe, config, parameters)
         self.mode = CopterMode.STABILIZE
         self._target = AngleTarget()
-        self._collective = 0.0
         self._low_battery_told = False
         self._low_battery_s = 0.0
         self._client_silent_s: float | None = None
@@ -264,9 +263,8 @@ class ArduCopterPeer(AutopilotPeer):
         else:
             collective = raw
             self._climb_loop.reset(self.sensors.height_m, raw, self.sensors.climb_mps)
-        self._collective = collective
         self._detect_landing(dt_s, climb_mps, collective)
-        self._learn_hover(dt_s)
+        self._learn_hover(dt_s, collective)
         return self._fly(roll, pitch, yaw, yaw_rate, collective)
 
     def _targets(self, dt_s: float) -> tuple[float, float, float, float, float]:
@@ -305,7 +303,6 @@ class ArduCopterPeer(AutopilotPeer):
     def _stand(self, dt_s: float) -> AirframeCommand:
         """Armed on the floor: motors idle, targets follow the vehicle, and the disarm delay runs."""
         self._climb_loop.reset(self.sensors.height_m)
-        self._collective = 0.0
         self._stick_yaw_rad = self.sensors.yaw_rad
         if self._target.holding:
             self._target.yaw_rad = self.sensors.yaw_rad
@@ -329,16 +326,16 @@ class ArduCopterPeer(AutopilotPeer):
         accel_mps2 = self.parameters["WPNAV_ACCEL_Z"] / 100.0
         return ClimbGains(accel_mps2=accel_mps2, jerk_mps3=self.parameters["PSC_JERK_Z"])
 
-    def _learn_hover(self, dt_s: float) -> None:
+    def _learn_hover(self, dt_s: float, collective: float) -> None:
         """MOT_THST_HOVER follows the collective of a hover that is nearly level, where MOT_HOVER_LEARN says
         so."""
         sensors, parameters = self.sensors, self.parameters
         leans = max(abs(sensors.roll_rad), abs(sensors.pitch_rad)) > _LEARN_RAD
-        if self.landed or not parameters["MOT_HOVER_LEARN"] or leans or not self._collective:
+        if self.landed or not parameters["MOT_HOVER_LEARN"] or leans or not collective:
             return
         if abs(sensors.climb_mps) < _LEARN_MPS and abs(self._climb_loop.wanted_mps) < _HOLDS_MPS:
             guess = parameters["MOT_THST_HOVER"]
-            guess += (self._collective - guess) * dt_s / (dt_s + _LEARN_S)
+            guess += (collective - guess) * dt_s / (dt_s + _LEARN_S)
             parameters["MOT_THST_HOVER"] = min(max(guess, _LEAST_HOVER), _MOST_HOVER)
 
     def _watch_client(self, dt_s: float) -> None:

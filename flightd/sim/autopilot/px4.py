@@ -74,7 +74,7 @@ class Px4Peer(AutopilotPeer):
         self.mode = Px4Mode.ALTCTL
         self._q_target = (0.0, 0.0, 0.0)
         self._yaw_rate_radps = 0.0
-        self._thrust = self._collective = 0.0
+        self._thrust = 0.0
         self._hover = parameters["MPC_THR_HOVER"]
         self._setpoint_age_s = math.inf
         self._stream_s = 0.0
@@ -216,8 +216,7 @@ class Px4Peer(AutopilotPeer):
         if self.mode == Px4Mode.OFFBOARD and self._setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
             self._lose_offboard()
         roll, pitch, yaw, yaw_rate, collective, down = self._targets(dt_s)
-        self._collective = collective
-        self._estimate_hover(dt_s)
+        self._estimate_hover(dt_s, collective)
         self._detect_landing(dt_s, collective, down=down)
         self._disarm_when_done(dt_s)
         return self._fly(roll, pitch, yaw, yaw_rate, max(collective, _IDLE_COLLECTIVE))
@@ -238,7 +237,7 @@ class Px4Peer(AutopilotPeer):
         collective = self._hold_climb(dt_s, climb_mps)
         return roll, pitch, self._stick_yaw_rad, sticks.yaw_rate_radps, collective, climb_mps < 0.0
 
-    def _estimate_hover(self, dt_s: float) -> None:
+    def _estimate_hover(self, dt_s: float, collective: float) -> None:
         """As its hover thrust estimator, which begins anew with each flight and learns by its own height loop
         alone: nothing while this computer holds the height."""
         if self.landed:
@@ -247,8 +246,7 @@ class Px4Peer(AutopilotPeer):
             return
         felt = 1.0 + self.sensors.accel_mps2 / GRAVITY_MPS2
         if felt > _LEAST_FELT:
-            tilt_cos = math.cos(self.sensors.roll_rad) * math.cos(self.sensors.pitch_rad)
-            hovers = self._collective * tilt_cos / felt
+            hovers = collective * self.sensors.tilt_cos / felt
             self._hover += (hovers - self._hover) * min(dt_s / _HOVER_S, 1.0)
 
     def _detect_landing(self, dt_s: float, collective: float, *, down: bool) -> None:

@@ -23,7 +23,7 @@ from flightd.sim.floor.lighting import Lighting
 from flightd.sim.floor.paint_damage import UNDAMAGED, PaintDamage
 from flightd.sim.floor.tiles import Ahead, TiledFloor
 from flightd.sim.plant.kinematics import Kinematics
-from flightd.sim.sensors.camera_effects import Sensor, blur_kernel, blur_wobbling
+from flightd.sim.sensors.camera_effects import Sensor, blur_kernel, blur_vibrating
 from flightd.sim.sensors.optics import (
     USUALLY,
     Floats,
@@ -34,7 +34,7 @@ from flightd.sim.sensors.optics import (
     moved,
     picture_for,
     smear_px,
-    wobble_px,
+    vibration_px,
 )
 from flightd.site.site import Site
 
@@ -113,8 +113,8 @@ class Renderer:
         across, down = smear_px(camera, kinematics) if moves else (0.0, 0.0)
         smear = across * exposure, down * exposure
         if moves and camera.vibration.rms_rad:
-            wobble = wobble_px(camera, kinematics.stamp_ns, exposure, _STRIPS if camera.readout_s else 1)
-            blur_wobbling(picture, smear, wobble, self._look.soft_px)
+            swept = vibration_px(camera, kinematics.stamp_ns, exposure, _STRIPS if camera.readout_s else 1)
+            blur_vibrating(picture, smear, swept, self._look.soft_px)
             return
         kernel = blur_kernel(smear, self._look.soft_px)
         if kernel is not None:

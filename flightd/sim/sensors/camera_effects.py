@@ -133,36 +133,38 @@ def blur_kernel(smear_px: tuple[float, float], soft_px: float) -> Floats | None:
     return normal
 
 
-def blur_wobbling(picture: Image, smear_px: tuple[float, float], wobble_px: Matrix, soft_px: float) -> None:
-    """Blur in place what a camera sees that vibrates besides: each of its equal strips of rows along the way
-    of `wobble_px` (strips, moments of the exposure, 2), which leaves its mean in place.
+def blur_vibrating(
+    picture: Image, smear_px: tuple[float, float], vibration_px: Matrix, soft_px: float
+) -> None:
+    """Blur in place what a camera sees that vibrates besides: each of its equal strips of rows along what
+    it sweeps by `vibration_px` (strips, moments of the exposure, 2), which leaves its mean in place.
 
-    The axes wobble by tones of their own, so it is done by columns and by rows, at a quarter of the time; a
+    The axes vibrate by tones of their own, so it is done by columns and by rows, at a quarter of the time; a
     smear that is oblique is laid first, as if it had nothing to do with them."""
     if min(map(abs, smear_px)) > _OBLIQUE_PX:
         kernel = blur_kernel(smear_px, soft_px)
         if kernel is not None:
             cv2.filter2D(picture, -1, kernel, dst=picture, borderType=cv2.BORDER_REPLICATE)
         smear_px, soft_px = (0.0, 0.0), 0.0
-    strips, moments, _ = wobble_px.shape
+    strips, moments, _ = vibration_px.shape
     steady = ((np.arange(moments) + 0.5) / moments - 0.5)[:, None] * np.clip(
         smear_px, -_MAX_SMEAR_PX, _MAX_SMEAR_PX
     )
     sharp, bounds = picture.copy(), np.linspace(0, len(picture), strips + 1).astype(int)
-    for way_px, top, bottom in zip(wobble_px + steady, bounds[:-1], bounds[1:], strict=True):
-        across, down = (_way_kernel(axis_px, soft_px) for axis_px in way_px.T)
+    for swept_px, top, bottom in zip(vibration_px + steady, bounds[:-1], bounds[1:], strict=True):
+        across, down = (_swept_kernel(axis_px, soft_px) for axis_px in swept_px.T)
         above = max(top - len(down) // 2, 0)
         seen = sharp[above : bottom + len(down) // 2]
         blurred = cv2.sepFilter2D(seen, -1, across, down, borderType=cv2.BORDER_REPLICATE)
         picture[top:bottom] = blurred[top - above : bottom - above]
 
 
-def _way_kernel(way_px: Matrix, soft_px: float) -> Floats:
-    """Of one axis: a pixel is lit by all that comes over it by the (N,) places of a way, softened.  A place
-    between pixels is shared by both, so that the mean of them all stays where it is.  For a correlation, as
-    OpenCV filters: what comes from one side stands on the other."""
-    half = max(1, math.ceil(float(np.abs(way_px).max())))
-    shared = np.clip(1.0 - np.abs(np.arange(-half, half + 1) + way_px[:, None]), 0.0, None)
+def _swept_kernel(swept_px: Matrix, soft_px: float) -> Floats:
+    """Of one axis: a pixel is lit by all that comes over it by the (N,) places that are swept, softened.  A
+    place between pixels is shared by both, so that the mean of them all stays where it is.  For a
+    correlation, as OpenCV filters: what comes from one side stands on the other."""
+    half = max(1, math.ceil(float(np.abs(swept_px).max())))
+    shared = np.clip(1.0 - np.abs(np.arange(-half, half + 1) + swept_px[:, None]), 0.0, None)
     reach = math.ceil(1.6 * soft_px)
     soft = np.exp(-((np.arange(-reach, reach + 1) / max(soft_px, 0.1)) ** 2) / 2)
     kernel: Floats = (np.convolve(shared.mean(axis=0), soft) / soft.sum()).astype(np.float32)

@@ -136,6 +136,11 @@ class Sensors:
         self._elapsed_s = 0.0
 
     @property
+    def tilt_cos(self) -> float:
+        """How much of the thrust lifts, by the attitude as it is estimated."""
+        return math.cos(self.roll_rad) * math.cos(self.pitch_rad)
+
+    @property
     def told_climb_mps(self) -> float:
         """The estimate of the climb rate as it is told."""
         stuck_mps = self.fault.climb_stuck_mps

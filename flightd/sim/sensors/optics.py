@@ -157,7 +157,7 @@ def smear_px(camera: SimCamera, kinematics: Kinematics) -> tuple[float, float]:
     return camera.lens.fx_px * float(right / depth), camera.lens.fy_px * float(down / depth)
 
 
-def wobble_px(camera: SimCamera, stamp_ns: int, exposure: float, strips: int) -> Matrix:
+def vibration_px(camera: SimCamera, stamp_ns: int, exposure: float, strips: int) -> Matrix:
     """(strips, moments, 2) how far (right, down) vibration moves what each of as many equal strips of rows
     shows in the picture's middle, from its place on average and in the course of its exposure; `exposure` as
     in `Taking`."""
@@ -166,8 +166,8 @@ def wobble_px(camera: SimCamera, stamp_ns: int, exposure: float, strips: int) ->
     rows = ((np.arange(strips) + 0.5) / strips - 0.5) * camera.readout_s
     about_right, about_down, _ = camera.turned_rad(stamp_ns, rows[:, None] + moments)
     moved_px = np.stack([-camera.lens.fx_px * about_down, camera.lens.fy_px * about_right], axis=-1)
-    wobble: Matrix = moved_px - moved_px.mean(axis=1, keepdims=True)
-    return wobble
+    swept: Matrix = moved_px - moved_px.mean(axis=1, keepdims=True)
+    return swept
 
 
 def moved(k: Kinematics, dt_s: float) -> Kinematics:

@@ -28,7 +28,7 @@ from flightd.sim.floor.renderer import Renderer
 from flightd.sim.plant.airframe import Airframe
 from flightd.sim.plant.kinematics import Kinematics
 from flightd.sim.scenario.scenario import Scenario
-from flightd.sim.sensors.camera_effects import blur_wobbling
+from flightd.sim.sensors.camera_effects import blur_vibrating
 from flightd.sim.sensors.cheap_camera import FAITHFUL
 from flightd.sim.sensors.instruments import SensorParams, Sensors
 from flightd.sim.sensors.optics import SimCamera
@@ -131,9 +131,9 @@ def test_it_blurs_edges_and_leaves_them_in_place(readout_s: float) -> None:
     )
     steepest = [int(np.abs(np.diff(one.astype(int), axis=1)).max()) for one in (sharp, blurred)]
     assert steepest[1] < 0.7 * steepest[0]
-    away_px = (moments_px(blurred)[0] - moments_px(sharp)[0])[20:-20]
-    assert np.abs(away_px).mean() < 0.1
-    assert np.abs(away_px).max() < 0.35
+    aswept_px = (moments_px(blurred)[0] - moments_px(sharp)[0])[20:-20]
+    assert np.abs(aswept_px).mean() < 0.1
+    assert np.abs(aswept_px).max() < 0.35
 
 
 def moments_px(picture: Image) -> tuple[Matrix, Matrix]:
@@ -151,9 +151,9 @@ def test_what_is_swept_lies_on_the_side_where_the_camera_saw_it() -> None:
     """A point seen 1 px to the right for five sixths of the exposure, 5 px to the left for the rest."""
     picture = np.zeros((9, 41), np.uint8)
     picture[:, 20] = 240
-    way_px = np.zeros((1, 24, 2))
-    way_px[0, :20, 0], way_px[0, 20:, 0] = 1.0, -5.0
-    blur_wobbling(picture, (0.0, 0.0), way_px, 0.0)
+    swept_px = np.zeros((1, 24, 2))
+    swept_px[0, :20, 0], swept_px[0, 20:, 0] = 1.0, -5.0
+    blur_vibrating(picture, (0.0, 0.0), swept_px, 0.0)
     assert (picture[4, 21], picture[4, 15]) == (200, 40)
 
 
@@ -250,9 +250,9 @@ def test_the_frames_that_a_worlds_camera_sends_are_shaken(tmp_path: Path) -> Non
     shaken_px = np.array([seen_at_px(frame)[4:-4] for frame in frames_of(shaking, tmp_path / "shaken")])
     assert len(shaken_px) > 20
     assert np.ptp(still, axis=0).max() < 0.05
-    away_px = shaken_px - still[0]
+    aswept_px = shaken_px - still[0]
     # the camera sits a quarter turn aside: its picture goes right and left by pitch
     meant_rad = vibration.angles_rad(np.arange(0.0, 10.0, 1e-4), SimCamera().exposure_s)[1].std()
-    assert away_px.std() == pytest.approx(meant_rad * SimCamera().lens.fx_px, rel=0.3)
-    assert np.median(away_px.std(axis=1)) > 0.3 * away_px.std()  # within one frame
-    assert away_px[:, 176].std() > 0.5 * away_px.std()  # and from frame to frame
+    assert aswept_px.std() == pytest.approx(meant_rad * SimCamera().lens.fx_px, rel=0.3)
+    assert np.median(aswept_px.std(axis=1)) > 0.3 * aswept_px.std()  # within one frame
+    assert aswept_px[:, 176].std() > 0.5 * aswept_px.std()  # and from frame to frame
